@@ -127,7 +127,7 @@ def live(
 
 def _list(voice: Voice) -> None:
     """Show what there is to watch, and to flash."""
-    from psvideo.runs.steps.live_sources import on_set
+    from psvideo.runs.on_set.live_sources import on_set
 
     found = on_set()
     voice.result({"found": [asdict(one) for one in found]})

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Footage, Force, OrderRig
+from psvideo.cli.options.clip_and_run import ClipWords, Force, OrderRig
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_starts_s
 from psvideo.errors import UsageError
@@ -49,7 +49,7 @@ def sync(
     clip: ClipPaths,
     *,
     out: TimingOut = None,
-    footage: Footage,
+    words: ClipWords,
     rig: OrderRig = None,
     picture: PictureOut = None,
     starts: Starts = None,
@@ -61,7 +61,7 @@ def sync(
     from psvideo.runs.sync import sync as find
 
     if len(clip) > 1:
-        _refuse_of_one(**vars(footage), rig=rig, picture=picture)
+        _refuse_of_one(**vars(words), rig=rig, picture=picture)
         _several(clip, out, starts, force, voice)
         return
     if starts is not None:
@@ -69,7 +69,7 @@ def sync(
     timing = find(
         clip[0],
         out=out,
-        **vars(footage),
+        **vars(words),
         rig=rig,
         picture=picture,
         force=force,

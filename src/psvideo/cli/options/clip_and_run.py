@@ -56,8 +56,8 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but erro
 
 
 @dataclass(frozen=True, kw_only=True)
-class Footage:
-    """What a clip is read with."""
+class ClipWords:
+    """What a clip is read with, as typed."""
 
     plan: PlanPath = None
     frames: Frames = None

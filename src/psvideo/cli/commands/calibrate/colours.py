@@ -9,7 +9,7 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_box
 from psvideo.model.units import counted
@@ -26,7 +26,7 @@ def colours(
         str | None, typer.Option(help="The card's part of the picture: left,top,right,bottom in pixels.")
     ] = None,
     transfer: Transfer = None,
-    footage: Footage,
+    words: ClipWords,
     force: Force = False,
     sharing: Sharing,
     voice: Voice,
@@ -47,7 +47,7 @@ def colours(
         albedo=albedo,
         box=None if box is None else parse_box(box),
         transfer=transfer,
-        **vars(footage),
+        **vars(words),
     )
     if done is None:
         return

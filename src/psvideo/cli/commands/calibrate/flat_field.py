@@ -10,7 +10,7 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_box
 from psvideo.model.units import counted
@@ -33,7 +33,7 @@ def flat_field(
         Path | None, typer.Option(help="File for the lights' fall-off over the target, for psvideo normals --flat.")
     ] = None,
     transfer: Transfer = None,
-    footage: Footage,
+    words: ClipWords,
     force: Force = False,
     sharing: Sharing,
     voice: Voice,
@@ -55,7 +55,7 @@ def flat_field(
         box=None if box is None else parse_box(box),
         flat=flat,
         transfer=transfer,
-        **vars(footage),
+        **vars(words),
     )
     if found is None:
         return

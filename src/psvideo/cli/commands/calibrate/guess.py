@@ -8,7 +8,7 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Pictures, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import Footage, Force
+from psvideo.cli.options.clip_and_run import ClipWords, Force
 from psvideo.cli.options.records import spread
 from psvideo.model.choices import Prior
 from psvideo.model.units import counted
@@ -27,7 +27,7 @@ def guess(
         ),
     ] = None,
     transfer: Transfer = None,
-    footage: Footage,
+    words: ClipWords,
     force: Force = False,
     voice: Voice,
 ) -> None:
@@ -39,7 +39,7 @@ def guess(
         out=out,
         prior=prior,
         transfer=transfer,
-        **vars(footage),
+        **vars(words),
         force=force,
         watch=voice.track,
         caller=voice.caller(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.model.units import counted
 
@@ -17,7 +17,7 @@ def intensities(
     out: RigOut,
     *,
     transfer: Transfer = None,
-    footage: Footage,
+    words: ClipWords,
     force: Force = False,
     sharing: Sharing,
     voice: Voice,
@@ -35,7 +35,7 @@ def intensities(
         sharing=sharing,
         rig=rig,
         transfer=transfer,
-        **vars(footage),
+        **vars(words),
     )
     if found is None:
         return

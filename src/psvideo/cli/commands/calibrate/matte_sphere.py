@@ -9,7 +9,7 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import FocalPx, PicturesOfTakes, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_circle
 from psvideo.model.units import counted
@@ -32,7 +32,7 @@ def matte_sphere(
     ] = None,
     focal_px: FocalPx = None,
     transfer: Transfer = None,
-    footage: Footage,
+    words: ClipWords,
     force: Force = False,
     sharing: Sharing,
     voice: Voice,
@@ -52,7 +52,7 @@ def matte_sphere(
         albedo=albedo,
         focal_px=focal_px,
         transfer=transfer,
-        **vars(footage),
+        **vars(words),
     )
     if found is None:
         return

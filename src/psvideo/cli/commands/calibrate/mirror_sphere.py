@@ -10,7 +10,7 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import calibrate_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
-from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_circle, parse_point, parse_radius_mm
 from psvideo.errors import UsageError
@@ -41,7 +41,7 @@ def mirror_sphere(
         Path | None, typer.Option(help="A picture from the same camera with the room light on, to find the outline in.")
     ] = None,
     transfer: Transfer = None,
-    footage: Footage,
+    words: ClipWords,
     each: Annotated[
         bool,
         typer.Option(
@@ -65,7 +65,7 @@ def mirror_sphere(
         radius_mm=None if radius_mm is None else parse_radius_mm(radius_mm),
         outline_picture=outline_picture,
         transfer=transfer,
-        **vars(footage),
+        **vars(words),
     )
     common: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
     if each:
