@@ -124,7 +124,13 @@ def test_a_row_that_one_light_lacks_is_missing_in_the_sum() -> None:
     assert held.image[:, 0].tolist() == [3, 0, 0]
 
 
-@pytest.mark.parametrize("text", ["key", "key=", "key=-1", "key=nan", "=x"])
+def test_several_weights_are_given_in_one_word_and_never_two_to_one_light() -> None:
+    assert parse_weights(["key=0.5,left=2", "rim=0"]) == {"key": 0.5, "left": 2.0, "rim": 0.0}
+    with pytest.raises(UsageError, match=r"key is 0\.5 already"):
+        parse_weights(["key=0.5", "key=1"])
+
+
+@pytest.mark.parametrize("text", ["key", "key=", "key=-1", "key=nan", "=x", "key=1,left"])
 def test_a_weight_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match=r"such as key=0\.5"):
         parse_weights([text])

@@ -93,8 +93,11 @@ def test_a_check_shows_ticks_wiring_and_what_to_beware_of(plan_file: Path, capsy
         (["--line", "key=-1"], 2, "such as key=0"),
         (["--line", "kye=1", "--board", "rp2040"], 2, "did you mean 'key'"),
         (["--line", "key=1", "--line", "key=2"], 2, "wired to line 1 already"),
+        (["--line", "key=1,left"], 2, "--line key=1,left: expected a light's name and a line's number"),
+        (["--line", "kye=1"], 2, "the plan has no such light: did you mean 'key'"),
         (["--board", "atmega328p", "--wiring", "direct"], 1, "3 lights and this board has 2 lines"),
         (["--port", "/dev/ttyNOT0"], 1, "no such port"),
+        (["--port", __file__], 1, "is no serial port, or one that does not answer; psvideo strobe list shows"),
     ],
 )
 def test_wrong_usage_and_plans_that_do_not_fit_are_one_paragraph(
@@ -104,6 +107,13 @@ def test_wrong_usage_and_plans_that_do_not_fit_are_one_paragraph(
     said = capsys.readouterr().err
     assert says in said
     assert said.count("\n") == 1
+
+
+def test_several_lights_are_wired_in_one_word_as_durations_are_given(
+    plan_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("strobe", "check", plan_file, "--board", "rp2040", "--line", "key=5,left=2") == 0
+    assert "key on line 5, left on line 2" in capsys.readouterr().out
 
 
 def test_times_that_cannot_be_are_refused(plan_file: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,9 +9,8 @@ from psvideo.strobe.link.replies import Capabilities
 
 def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, int]:
     """Return the line of every light of the plan. Raises UsageError where the wiring given cannot be."""
+    refuse_unknown_lights(plan, given)
     for name, line in given.items():
-        if name not in plan.lights:
-            raise UsageError(f"`line` {name}={line}: the plan has no such light: {nearest(name, plan.lights)}")
         if not 0 <= line < caps.lines:
             raise UsageError(
                 f"`line` {name}={line}: this board has {caps.lines} lines with {caps.wiring} wiring, numbered 0 to "
@@ -32,6 +31,13 @@ def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, 
         )
     rest = dict(zip(others, free, strict=False))
     return {name: given[name] if name in given else rest[name] for name in plan.lights}
+
+
+def refuse_unknown_lights(plan: Plan, given: Mapping[str, int]) -> None:
+    """Raise UsageError where a wiring names a light that the plan has not, whatever the board."""
+    for name, line in given.items():
+        if name not in plan.lights:
+            raise UsageError(f"`line` {name}={line}: the plan has no such light: {nearest(name, plan.lights)}")
 
 
 def _powers(plan: Plan, light: str) -> tuple[float, ...]:

@@ -55,37 +55,53 @@ def parse_powers(text: str, lights: Sequence[str]) -> Mapping[str, float]:
 
 
 def parse_weights(words: Sequence[str] | None) -> dict[str, float]:
-    """Return how strong lights are in the beauty plate, from ``key=0.5``, one a light.
+    """Return how strong lights are in the beauty plate, from ``key=0.5``, or several in one word.
 
-    >>> parse_weights(["key=0.5", "left=2"])
-    {'key': 0.5, 'left': 2.0}
+    >>> parse_weights(["key=0.5", "left=2,rim=0"])
+    {'key': 0.5, 'left': 2.0, 'rim': 0.0}
     """
     found: dict[str, float] = {}
-    for text in words or ():
-        name, equals, number = text.partition("=")
-        try:
-            weight = float(number)
-        except ValueError:
-            weight = math.nan
-        if not equals or not math.isfinite(weight) or weight < 0:
-            raise UsageError(f"--weight {text}: expected a light's name and how strong it is to be, such as key=0.5.")
-        found[name] = weight
+    for word in words or ():
+        for text in word.split(","):
+            name, equals, number = text.strip().partition("=")
+            try:
+                weight = float(number)
+            except ValueError:
+                weight = math.nan
+            if not equals or not math.isfinite(weight) or weight < 0:
+                raise UsageError(
+                    f"--weight {word}: expected a light's name and how strong it is to be, such as key=0.5."
+                )
+            if name in found and found[name] != weight:
+                raise UsageError(f"--weight {word}: {name} is {found[name]:g} already. Give one weight for each light.")
+            found[name] = weight
     return found
 
 
 def parse_lines(words: Sequence[str] | None) -> dict[str, int]:
-    """Return light names and lines out of ``key=0``, or ``key,rim=0`` for lights that share one.
+    """Return light names and lines out of ``key=0``, ``key=0,left=1``, or ``key,rim=0`` for lights that share one.
 
-    >>> parse_lines(["key=0", "left,rim=3"])
-    {'key': 0, 'left': 3, 'rim': 3}
+    >>> parse_lines(["key=0", "left,rim=3", "top=1,low=2"])
+    {'key': 0, 'left': 3, 'rim': 3, 'top': 1, 'low': 2}
     """
     lines: dict[str, int] = {}
     for word in words or ():
-        names, _, line = word.rpartition("=")
-        for name in names.split(","):
-            if not name or not line.isdecimal():
-                raise UsageError(f"--line {word}: expected a light's name and a line's number, such as key=0.")
-            if name in lines:
-                raise UsageError(f"--line {word}: {name} is wired to line {lines[name]} already.")
-            lines[name] = int(line)
+        waiting: list[str] = []
+        for part in word.split(","):
+            name, equals, line = part.strip().partition("=")
+            if not name or (equals and not line.isdecimal()):
+                raise _no_line(word)
+            waiting.append(name)
+            if equals:
+                for wired in waiting:
+                    if wired in lines:
+                        raise UsageError(f"--line {word}: {wired} is wired to line {lines[wired]} already.")
+                    lines[wired] = int(line)
+                waiting = []
+        if waiting:
+            raise _no_line(word)
     return lines
+
+
+def _no_line(word: str) -> UsageError:
+    return UsageError(f"--line {word}: expected a light's name and a line's number, such as key=0.")

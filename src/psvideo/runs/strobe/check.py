@@ -16,6 +16,7 @@ from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.program_words import program_cautions
 from psvideo.strobe.seizures import seizure_warning
 from psvideo.strobe.session import prepare
+from psvideo.strobe.wiring import refuse_unknown_lights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,9 +63,13 @@ def check(
 def check_boards(
     plan: Path | str, *, line: Mapping[str, int] | None = None, wiring: WiringName | None = None
 ) -> tuple[BoardCheck, ...]:
-    """Check a plan against every board of the table and each of its wirings, or the one ``wiring`` alone."""
+    """Check a plan against every board of the table and each of its wirings, or the one ``wiring`` alone.
+
+    Raises UsageError where ``line`` names a light that the plan has not.
+    """
     path = Path(plan)
     planned = read_plan(path)
+    refuse_unknown_lights(planned, line or {})
     return tuple(
         _check_board(planned, path, board, capabilities(board, name), line)
         for board in BOARDS.values()
