@@ -12,6 +12,8 @@ import imagecodecs
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from psvideo.clip import holes, open_clip, parse_range, read_frames, reading
 from psvideo.clip.decode.decoders import decode
@@ -21,6 +23,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
+from psvideo.synth.camera.dpx_writer import dpx_bytes
 
 ROWS, COLS = 6, 8
 
@@ -340,6 +343,38 @@ def test_a_headerless_mosaic_is_a_clip_once_it_is_a_tiff(
     tifffile.imwrite(tmp_path / "rose.0001.tif", codes)
     (frame,) = read_frames(open_clip(tmp_path))
     assert np.allclose(frame.image, (codes - 600.0) / 14920, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gamma", "transfer", "doubted"),
+    [(45455, "linear", True), (45455, "srgb", False), (100000, "linear", False), (100000, "srgb", True)],
+)
+def test_a_curve_that_pictures_name_is_held_against_the_plan_s(
+    tmp_path: Path, write_plan: Callable[..., None], gamma: int, transfer: str, doubted: bool
+) -> None:
+    """PNG names a gamma of 2.2 for sRGB too: only a curve that is far from the plan's is spoken of."""
+    info = PngInfo()
+    info.add(b"gAMA", gamma.to_bytes(4, "big"))
+    Image.fromarray(np.full((ROWS, COLS, 3), 90, np.uint8)).save(tmp_path / "shot.0001.png", pnginfo=info)
+    write_plan(tmp_path, transfer=transfer)
+    clip = open_clip(tmp_path)
+    assert bool(clip.curve_doubt) == doubted
+    assert any("tagged with the transfer" in warning for warning in clip.warnings) == doubted
+
+
+@pytest.mark.parametrize(
+    ("says", "transfer", "doubted"), [(3, "linear", True), (3, "logc3", False), (2, "srgb", False)]
+)
+def test_a_dpx_that_says_it_is_logarithmic_is_held_against_the_plan(
+    tmp_path: Path, write_plan: Callable[..., None], says: int, transfer: str, doubted: bool
+) -> None:
+    written = bytearray(dpx_bytes(np.full((ROWS, COLS, 3), 500, np.uint16), 10))
+    written[801] = says
+    (tmp_path / "shot.0001.dpx").write_bytes(written)
+    write_plan(tmp_path, transfer=transfer)
+    clip = open_clip(tmp_path)
+    assert ("hold a logarithm of light" in clip.curve_doubt) == doubted
+    assert bool(clip.warnings) == doubted
 
 
 def test_a_cameras_dng_is_a_clip(shared_data: Path, tmp_path: Path, write_plan: Callable[..., None]) -> None:

@@ -95,3 +95,24 @@ def test_a_job_that_cannot_be_is_refused_before_it_reaches_a_farm(clip: Path, tm
     (tmp_path / "job" / "results" / "mine").touch()
     with pytest.raises(UsageError, match="exists already"):
         farm(clip, rig=rig, results=tmp_path / "job" / "results")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--", "--aov", "dept"], "did you mean 'depth'"),
+        (["--", "--nosuch"], "No such option: --nosuch"),
+        (["--", "--start-number", "x"], "expected a whole number"),
+        (["--", "-o", "elsewhere"], "-o after --: farm has it itself"),
+        (["--", "--workers=2"], "--workers=2 after --: the farm shares the work"),
+        (["--", "--resume"], "--resume after --: farm gives it to every piece"),
+        (["another"], "another: farm takes one clip"),
+    ],
+)
+def test_options_that_would_fail_on_the_farm_are_refused_here(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], says: str
+) -> None:
+    typed = ["farm", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "job"), *words]
+    assert main(typed) == 2
+    assert says in " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert not (tmp_path / "job").exists()

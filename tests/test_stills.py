@@ -22,6 +22,7 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError
 from psvideo.inspect.describe import describe
+from psvideo.synth.camera.dpx_writer import dpx_bytes
 
 SIZE, RADIUS = 64, 27
 ANGLES = np.radians(np.arange(0, 360, 60))
@@ -192,6 +193,50 @@ def test_eight_bits_are_srgb_unless_they_say_otherwise(tmp_path: Path, said: str
     }
     assert why[said] in remarks(report)
     assert not any("fit the lights better" in warning for warning in report.warnings)
+
+
+@pytest.mark.parametrize(("code", "curve"), [(8, "linear"), (13, "srgb"), (16, "st2084"), (18, "hlg")])
+def test_a_png_s_own_code_of_its_curve_goes_before_what_is_usual(tmp_path: Path, code: int, curve: str) -> None:
+    """PNG 3, 11.3.2.6: the code of H.273 goes before profile, ``sRGB`` and ``gAMA``."""
+    signals: dict[str, Callable[[Picture], Picture]] = {
+        "linear": lambda light: light,
+        "srgb": as_srgb,
+        "st2084": lambda light: pq(100 * light),
+        "hlg": lambda light: np.where(light < 1 / 12, np.sqrt(3 * light), hlg_top(np.maximum(light, 1 / 12))),
+    }
+    info = chunk(b"cICP", bytes([9, code, 0, 1]))
+    info.add(b"gAMA", (55556).to_bytes(4, "big"))
+    folder = photographs(
+        tmp_path / "photos", lit(), save=lambda path, light: save8(path, signals[curve](light), pnginfo=info)
+    )
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert f"read as {curve!r}, as its cICP chunk says" in remarks(report)
+    assert error_deg(tmp_path / "out") < 1.5
+
+
+def pq(nits: Picture) -> Picture:
+    """The signal of so much light (SMPTE ST 2084, 5.2)."""
+    power = (nits / 10_000) ** (2610 / 16384)
+    return ((3424 / 4096 + 2413 / 128 * power) / (1 + 2392 / 128 * power)) ** (2523 / 32)
+
+
+def hlg_top(light: Picture) -> Picture:
+    """The signal of HLG above a twelfth (ITU-R BT.2100, table 5)."""
+    return 0.17883277 * np.log(12 * light - 0.28466892) + 0.55991073
+
+
+@pytest.mark.parametrize("says", [1, 3])
+def test_a_dpx_that_says_it_is_logarithmic_is_not_read_as_linear(tmp_path: Path, says: int) -> None:
+    def save(path: Path, light: Picture) -> None:
+        codes = np.round(1023 * np.log10(1 + 999 * light) / 3).astype(np.uint16)
+        coded = dpx_bytes(np.repeat(codes[..., None], 3, axis=2), 10)
+        path.with_suffix(".dpx").write_bytes(coded[:801] + bytes([says]) + coded[802:])
+
+    folder, lights = photographs(tmp_path / "photos", lit(), save=save), listed(tmp_path / "lights.lp")
+    with pytest.raises(PsvideoError, match=r"dpx: says that it holds a logarithm of light, and not which"):
+        ps.stills(folder, lights=lights, out=tmp_path / "out")
+    report = ps.stills(folder, lights=lights, out=tmp_path / "out", transfer="logc3")
+    assert "read as 'logc3', as you say" in remarks(report)
 
 
 def test_pictures_that_speak_against_what_was_assumed_of_them_are_named(tmp_path: Path) -> None:
@@ -370,6 +415,39 @@ BAD: dict[str, tuple[str, ...]] = {
     "no lights": ("`lights` and `sphere`: expected one of the two",),
     "no folder": ("is no folder",),
 }
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "says"),
+    [
+        (["--dark", "photos"], 1, "photos: is a folder, and one picture is expected"),
+        (["--dark", "no.png"], 1, "no.png: there is no such file"),
+        (["--dark", "lights.lp"], 1, "lights.lp: is no picture that psvideo reads"),
+        (["--mask", "photos"], 1, "photos: is a folder, and one picture is expected"),
+        (["--transfer", "slog4"], 2, "--transfer is 'slog4', not a curve that this psvideo knows; did you mean"),
+        (["--radius-mm", "20"], 2, "--radius-mm describes mirror spheres, and --lights"),
+        (["--circle", "80,60,40"], 2, "--circle describes mirror spheres"),
+        (["--spheres", "2"], 2, "--spheres describes mirror spheres"),
+        (["--aov", "motion"], 2, "--aov motion: photographs of a still scene show no motion"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_one_paragraph(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    status: int,
+    says: str,
+) -> None:
+    photographs(tmp_path / "photos", lit())
+    listed(tmp_path / "lights.lp")
+    monkeypatch.chdir(tmp_path)
+    assert main(["stills", "photos", "--lights", "lights.lp", "-o", "out", *words]) == status
+    said = capsys.readouterr()
+    assert says in said.err
+    assert said.err.count("\n") == 1
+    assert not said.out
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from psvideo.calibrate.light_files import bears, find_stills
 from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
+from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
 from psvideo.formats.paths import check_file
@@ -54,6 +55,7 @@ def pair_stills(
     """
     if not folder.is_dir():
         raise PsvideoError(f"{folder}: is no folder. Name the folder that holds the photographs, one per light.")
+    _refuse_other_than_pictures(dark, mask)
     found = find_stills(folder)
     apart = {file.resolve() for file in (dark, mask) if file}
     files = [one[0] for one in found.by_light.values() if one[0].resolve() not in apart]
@@ -79,6 +81,18 @@ def pair_stills(
     names = tuple(known) if keep_names else _own_names(chosen)
     places = tuple(range(len(known)))
     return Pairs(files=tuple(chosen), names=names, places=places, how=how, dark=dark, mask=mask, aside=tuple(aside))
+
+
+def _refuse_other_than_pictures(*given: Path | None) -> None:
+    """Raise PsvideoError where a picture that somebody names is none."""
+    for file in given:
+        if file is None:
+            continue
+        if not file.is_file():
+            found = "is a folder" if file.is_dir() else "there is no such file"
+            raise PsvideoError(f"{file}: {found}, and one picture is expected. Name the picture.")
+        if file.suffix.lower() not in KINDS:
+            raise PsvideoError(f"{file}: is no picture that psvideo reads; expected one of {', '.join(USUAL_KINDS)}.")
 
 
 def _refuse_few(folder: Path, files: Sequence[Path]) -> None:

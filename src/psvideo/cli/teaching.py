@@ -19,6 +19,14 @@ MISSING = {
     "out": "It names what to write; nothing that exists is replaced without --force.",
 }
 """What options that may not be left out are for."""
+NUMBERS = (
+    (r"Input should be a valid integer.*", "expected a whole number"),
+    (r"Input should be a valid number.*", "expected a number"),
+    (r"Input should be a finite number", "expected a number"),
+    (r"Input should be greater than or equal to (\S+)", r"expected \1 or more"),
+    (r"Input should be less than or equal to (\S+)", r"expected \1 or less"),
+)
+"""What pydantic says of a number that is none or out of range, and the same in the words of other messages."""
 
 
 def examples_of(path: str) -> tuple[tuple[str, str], ...]:
@@ -47,8 +55,12 @@ def _with_the_nearest(message: str) -> str:
     "'nuk' is not one of 'nuke', 'blender'; did you mean 'nuke'?"
     >>> _with_the_nearest("'a,b' is not one of 'a', 'b'.")
     "'a,b' is not one of 'a', 'b': give the option once for each"
+    >>> _with_the_nearest("Input should be greater than or equal to 1")
+    'expected 1 or more'
     """
     message = message.removeprefix("Value error, ")
+    for pattern, words in NUMBERS:
+        message = re.sub(pattern, words, message)
     word, between, listed = message.partition(" is not one of ")
     choices = re.findall("'([^']*)'", listed)
     if "," in word and set(re.split(r"\s*,\s*", word.strip("'"))) <= {*choices}:

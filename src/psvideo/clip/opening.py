@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.movies.yuv import signal_range
 from psvideo.clip.filters import check_filters
-from psvideo.clip.folder import MOVIES, RAWS, find_sequence, unread
+from psvideo.clip.folder import MOVIES, RAWS, NumberedImages, find_sequence, unread
 from psvideo.clip.linear import depth_held
 from psvideo.clip.record import Clip, Header
+from psvideo.clip.stated import stated_by
 from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve, is_another_curve
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import FRAMES, find_plan, read_plan
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 RATE_TOLERANCE = 5e-4
 """A movie's rate counts as the plan's within this share: tighter than 120 for 119.88."""
+PROFILED = ("png", "tiff", "jpeg")
+"""Kinds of pictures that name their curve by a profile or in chunks; one that is close to the plan's is not spoken of,
+as profiles name sRGB and a gamma of 2.2 for each other."""
 
 
 def open_clip(path: Path, *, plan: Path | None = None) -> Clip:
@@ -48,7 +52,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
     sequence = find_sequence(path)
     plan_path = find_plan(path, given=plan_path)
     plan = read_plan(plan_path)
-    header = read_header(sequence.kind, sequence.files[0])
+    header = _tagged(sequence, read_header(sequence.kind, sequence.files[0]))
     check_fit(sequence.files[0], header, plan, plan_path)
     encoding = _encoding(sequence.kind, plan, plan_path)
     passed_over = f"left aside, having no number at the end: {', '.join(file.name for file in sequence.passed_over)}"
@@ -67,6 +71,12 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         warnings=header.warnings + _curve_warnings(sequence.kind, plan, header),
         notes=((passed_over,) if sequence.passed_over else ()) + _depth_note(header, encoding) + _turn_note(header),
     )
+
+
+def _tagged(sequence: NumberedImages, header: Header) -> Header:
+    """Return the header with the curve that the first file's profile or chunks name, where the decoder found none."""
+    said = stated_by(sequence.files[0]).transfer if sequence.kind in PROFILED else None
+    return header if header.transfer or said in (None, "unknown") else replace(header, transfer=said)
 
 
 def _open_movie(path: Path, plan_path: Path | None) -> Clip:
@@ -153,6 +163,8 @@ def _curve_warnings(kind: str, plan: Plan, header: Header) -> tuple[str, ...]:
         said = f"{kind.upper()} files hold linear light, so the plan's transfer = {transfer!r} is not applied"
         return () if linear else (said,)
     wrong = disagreement(transfer, tagged=header.transfer, kind=kind)
+    if kind in PROFILED and header.transfer and not is_another_curve(transfer, header.transfer):
+        return ()
     return () if wrong is None else (wrong,)
 
 

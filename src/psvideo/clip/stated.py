@@ -1,7 +1,7 @@
 """What a photograph's file says of itself beside its pixels: how it was exposed, how it lies, and its colour's curve.
 
 EXIF (CIPA DC-008) is read from JPEG, TIFF and PNG; the curve from an ICC profile (ICC.1, the red or grey channel's
-``TRC``) or from PNG's own chunks (``sRGB``, ``gAMA``).
+``TRC``) or from PNG's own chunks (``cICP``, ``sRGB``, ``gAMA``).
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from PIL import ExifTags, Image
 
-from psvideo.clip.transfer import DISPLAYED, find_curve, to_light
+from psvideo.clip.transfer import BY_H273, DISPLAYED, find_curve, to_light
 from psvideo.formats.paths import check_file
 from psvideo.model.camera import FloatArray
 from psvideo.model.turn import EXIF, UPRIGHT, Turn
@@ -57,7 +57,7 @@ def stated_by(path: Path) -> Stated:
         with Image.open(path) as picture:
             exif = picture.getexif()
             taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
-            transfer, by = _curve(picture.info)
+            transfer, by = _coded_curve(path) or _curve(picture.info)
             longer_px = max(picture.size)
         return Stated(
             transfer=transfer,
@@ -89,6 +89,21 @@ def _exposure(taken: dict[int, Any]) -> float | None:
     iso = taken.get(ExifTags.Base.ISOSpeedRatings)
     speed = _above_0(iso[0] if isinstance(iso, tuple) and iso else iso) or 1.0
     return None if seconds is None else seconds * speed / stop**2
+
+
+def _coded_curve(path: Path) -> tuple[str, str] | None:
+    """Return the curve that a PNG's ``cICP`` chunk names, which goes before all else (PNG 3, 11.3.2.6)."""
+    with path.open("rb") as file:
+        if file.read(8) != b"\x89PNG\r\n\x1a\n":
+            return None
+        while len(head := file.read(8)) == 8:
+            size, name = struct.unpack(">I4s", head)
+            if name == b"cICP" and size == 4:
+                return BY_H273.get(file.read(4)[1], "unknown"), "its cICP chunk"
+            if name in (b"IDAT", b"IEND"):
+                return None
+            file.seek(size + 4, 1)
+    return None
 
 
 def _curve(info: dict[Any, Any]) -> tuple[str | None, str]:

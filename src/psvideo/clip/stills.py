@@ -15,7 +15,7 @@ from psvideo.clip.folder import KINDS, RAWS
 from psvideo.clip.reading import looks
 from psvideo.clip.record import Clip, Header, shot_of
 from psvideo.clip.stated import Stated, stated_by
-from psvideo.clip.transfer import find_curve
+from psvideo.clip.transfer import LOGARITHMIC, find_curve
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
@@ -179,6 +179,13 @@ def _transfer(files: Sequence[Path], kind: str, header: Header, stated: Sequence
             f"{files[0]}: {stated[0].by} has a curve that psvideo does not know. Export the pictures as sRGB or "
             "linear, or say with `transfer` which curve comes nearest."
         )
+    if header.transfer == LOGARITHMIC:
+        raise PsvideoError(
+            f"{files[0]}: says that it holds a logarithm of light, and not which. Say with `transfer` which curve it "
+            "is, such as slog3 or logc3, or export the pictures as linear."
+        )
+    if header.transfer:
+        return header.transfer, "as their header says"
     if named[0] and kind not in RAWS:
         return named[0], f"as {stated[0].by} says"
     if header.bits == 8:

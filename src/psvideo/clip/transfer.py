@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.errors import PsvideoError, nearest
+from psvideo.errors import PsvideoError, UsageError, nearest
 from psvideo.model.camera import FloatArray
 
 STUDIO_CONFIG = "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
@@ -117,6 +117,20 @@ CURVES = (
 
 DISPLAYED = ("linear", "srgb", "rec709", "gamma24", "gamma22", "gamma18", "st2084", "hlg")
 """The curves that a file's own tag can name."""
+LOGARITHMIC = "logarithmic"
+"""The tag of files that hold a logarithm of light and do not say which."""
+BY_H273 = {
+    1: "rec709",
+    4: "gamma22",
+    6: "rec709",
+    8: "linear",
+    13: "srgb",
+    14: "rec709",
+    15: "rec709",
+    16: "st2084",
+    18: "hlg",
+}
+"""Curves by their codes in ITU-T H.273, table 3, which movies and PNG (``cICP``) use."""
 
 
 def find_curve(name: str) -> TransferCurve:
@@ -129,15 +143,30 @@ def find_curve(name: str) -> TransferCurve:
     """
     found = _spellings().get(_letters(name))
     if found is None:
-        known = [curve.name for curve in CURVES]
-        advice = nearest(_letters(name), _spellings())
-        listed = "" if advice.startswith("known are") else f" Known are: {', '.join(known)}."
-        advice = f"known are: {', '.join(known)}." if not listed else advice
         raise PsvideoError(
-            f"transfer is {name!r}, not a curve that this psvideo knows; {advice}{listed} Write the name of the "
-            "curve with which the camera encoded the files into the plan's [camera] table."
+            f"transfer is {name!r}, {_unknown(name)} Write the name of the curve with which the camera encoded the "
+            "files into the plan's [camera] table."
         )
     return found
+
+
+def check_transfer(name: str | None) -> None:
+    """Raise UsageError where somebody names a curve that is not known; None says nothing.
+
+    >>> check_transfer("S-Log3")
+    """
+    if name is not None and _letters(name) not in _spellings():
+        raise UsageError(
+            f"`transfer` is {name!r}, {_unknown(name)} Name the curve with which the camera encoded the files."
+        )
+
+
+def _unknown(name: str) -> str:
+    known = [curve.name for curve in CURVES]
+    advice = nearest(_letters(name), _spellings())
+    listed = "" if advice.startswith("known are") else f" Known are: {', '.join(known)}."
+    advice = f"known are: {', '.join(known)}." if not listed else advice
+    return f"not a curve that this psvideo knows; {advice}{listed}"
 
 
 @functools.cache
@@ -176,6 +205,13 @@ def disagreement(named: str, *, tagged: str | None, kind: str) -> str | None:
             if wrong
             else None
         )
+    if tagged == LOGARITHMIC:
+        return (
+            None
+            if curve.name not in DISPLAYED
+            else f"the files say that they hold a logarithm of light, and the plan says {curve.name!r}, by which they "
+            "are read: write the camera's own curve into the plan, such as transfer = 'slog3' or 'logc3'"
+        )
     told = find_curve(tagged)
     broadcast = told.name in ("hlg", "st2084")
     if curve.name == told.name or (not broadcast and curve.name not in DISPLAYED):
@@ -193,6 +229,8 @@ def is_another_curve(named: str, tagged: str | None) -> bool:
     >>> is_another_curve("rec709", "hlg"), is_another_curve("rec709", "srgb")
     (True, False)
     """
+    if tagged == LOGARITHMIC:
+        return find_curve(named).name in DISPLAYED
     signal = np.linspace(0, 1, 65)
     read, told = (to_light(find_curve(name), signal) for name in (named, tagged or "srgb"))
     return float(np.abs(read / read[-1] - told / told[-1]).max()) >= FAR_APART

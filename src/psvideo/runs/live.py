@@ -131,8 +131,8 @@ def live(
     if recorded is not None:
         summary = replace(summary, recorded=recorded.written, notes=running.all_notes)
     if running.chain.follower is None:
-        why = running.chain.why or f"{played.name}: {summary.frames} frames are too few to find the strobe in."
-        raise NoStrobeError(why)
+        few = f"{played.name}: {summary.frames} frames are too few to find the strobe in. Let it run for longer."
+        raise NoStrobeError(running.chain.why or few)
     if timing_path is not None:
         write_text(timing_path, format_timing(_timing(running.chain, played)))
     return summary

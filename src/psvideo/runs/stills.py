@@ -8,6 +8,7 @@ from pathlib import Path
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_pairs import pair_stills
 from psvideo.clip import Take, decoded_once
+from psvideo.clip.transfer import check_transfer
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
@@ -98,6 +99,11 @@ def stills(
     path = path_of("folder", folder)
     output = Output(folder=path_of("out", out), force=force, caller=caller)
     output.check()
+    check_transfer(transfer)
+    if lights is not None and not sphere:
+        _refuse_words_on_spheres(radius_mm=radius_mm, circle=circle, spheres=spheres)
+    if "motion" in aov:
+        raise UsageError("`aov='motion'`: photographs of a still scene show no motion. Leave it out.")
     asked = Asked(preset=preset, aov=aov, mesh=mesh, encode=encode, plates=plates)
     delivery, _ = delivery_of(asked)
     looking = Looking(
@@ -145,6 +151,19 @@ def stills(
                 over_time=over_time,
             )
             return normals_run(job, output, watch=watch, beside=partial(write_setup, opened, rti=rti)).report
+
+
+def _refuse_words_on_spheres(
+    *, radius_mm: float | None, circle: Sequence[tuple[float, float, float]], spheres: int
+) -> None:
+    """Raise UsageError where something is said of mirror spheres and none is photographed."""
+    given = [("radius_mm", radius_mm is not None), ("circle", bool(circle)), ("spheres", spheres != 1)]
+    for name, said in given:
+        if said:
+            raise UsageError(
+                f"`{name}` describes mirror spheres, and `lights` says where the lights are without any. Leave it out, "
+                "or give `sphere` instead of `lights`."
+            )
 
 
 def _known_lights(

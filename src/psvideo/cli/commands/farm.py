@@ -1,13 +1,23 @@
 """psvideo farm: a run as a job for a render farm."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.main import get_command
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import ClipPath, Force, Json, PlanPath, Quiet, RigPath
+from psvideo.errors import UsageError
 from psvideo.model.units import counted
+
+OF_THE_FARM = {
+    **dict.fromkeys(("out", "rig", "plan"), "farm has it itself; give it before --"),
+    **dict.fromkeys(("piece", "resume"), "farm gives it to every piece; leave it out"),
+    **dict.fromkeys(("workers", "scheduler"), "the farm shares the work; leave it out"),
+}
+"""Options of normals that a job has no use for, and what to do instead."""
 
 
 def farm(
@@ -35,6 +45,7 @@ def farm(
 
     voice = Voice(json=json, quiet=quiet)
     words = options or []
+    _check_words(words)
     lines = write_job(clip, rig=rig, out=out, results=results, plan=plan, pieces=pieces, words=words, force=force)
     voice.result({"commands": lines})
     if commands:
@@ -43,3 +54,25 @@ def farm(
     elif out is not None:
         cut = counted(len(lines) - 2, "piece")
         voice.say(f"{out}: a job of {cut}. See {out / 'README.txt'} for how to run it.")
+
+
+def _check_words(words: Sequence[str]) -> None:
+    """Raise as ``psvideo normals`` would where options cannot be parsed, and UsageError where a job cannot have them:
+    here, not on the farm."""
+    from psvideo.cli.app import application
+
+    group: Any = get_command(application(["normals"]))
+    context = group.commands["normals"].make_context("psvideo normals", ["clip", "--rig", "rig", "-o", "out", *words])
+    if len(context.params["clips"]) > 1:
+        raise UsageError(
+            f"{context.params['clips'][1]}: farm takes one clip, and other options of normals after --. Write a job "
+            "for each clip."
+        )
+    for name, why in OF_THE_FARM.items():
+        given = [word for word in words if word.split("=")[0] in _spellings(context, name)]
+        if given:
+            raise UsageError(f"{given[0]} after --: {why}.")
+
+
+def _spellings(context: Any, name: str) -> tuple[str, ...]:
+    return next((tuple(param.opts) for param in context.command.params if param.name == name), ())

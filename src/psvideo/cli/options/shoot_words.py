@@ -15,8 +15,8 @@ from psvideo.cli.options.typed import (
     parse_size_px,
     parse_speed_px_s,
 )
-from psvideo.clip.transfer import find_curve
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.clip.transfer import check_transfer
+from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import CFA_PATTERNS
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Mode
@@ -89,10 +89,7 @@ def _encoding(words: ShootWords) -> Encoding:
         raise UsageError(
             f"--black {words.black:g} is not below --white {words.white:g}. Give the code of black and of saturation."
         )
-    try:
-        find_curve(words.transfer)
-    except PsvideoError as fault:
-        raise UsageError(f"--transfer: {fault}") from None
+    check_transfer(words.transfer)
     cfa = None if words.cfa is None else _choice(words.cfa.upper(), CFA_PATTERNS, option="--cfa")
     return Encoding(transfer=words.transfer, black_level=words.black, white_level=words.white, cfa=cfa)
 

@@ -9,11 +9,16 @@ import numpy as np
 from psvideo.clip.decode.movies.ffmpeg_planes import planes
 from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.transfer import LOGARITHMIC
 from psvideo.errors import PsvideoError
 
 BYTE_ORDERS = {b"SDPX": ">", b"XPDS": "<"}
 CHANNELS = {6: 1, 50: 3, 51: 3}  # luma; RGB; RGBA
 UNSET = 0xFFFFFFFF
+TRANSFERS = {1: LOGARITHMIC, 3: LOGARITHMIC, 5: "rec709", 6: "rec709", 7: "rec709", 8: "rec709"}
+"""Codes of SMPTE 268M, table 5A: 1 is printing density, as film scanners write it. 2 is linear, and says nothing, as
+FFmpeg writes it into every file.
+"""
 
 
 def header(path: Path) -> Header:
@@ -56,6 +61,7 @@ def _parse_header(path: Path, data: bytes) -> tuple[Header, int]:
         height_px=height_px,
         channels=CHANNELS[descriptor],
         bits=bits,
+        transfer=TRANSFERS.get(data[801]),
         time_code=_time_code(struct.unpack_from(order + "I", data, 1920)[0]),
         warnings=("the DPX files' alpha channel is left out",) if descriptor == 51 else (),
     )

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets
+from psvideo.clip.transfer import check_transfer
 from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
@@ -24,7 +25,8 @@ def picture_beside(out: Path, *, force: bool) -> Path:
 
 
 def reading_of(plan: Path | str | None, frames: str | None, first_light: str | None, transfer: str | None) -> Reading:
-    """Return how pictures are to be read."""
+    """Return how pictures are to be read. Raises UsageError where the curve named is not known."""
+    check_transfer(transfer)
     given = None if plan is None else Path(plan)
     return Reading(plan=given, frames=frames, first_light=first_light, transfer=transfer)
 

@@ -1,6 +1,6 @@
 """What a movie says of itself beside its pixels: which way is up, how it codes light, at which rate it was shot.
 
-Codes of transfer and primaries are those of ITU-T H.273, tables 2 and 3.
+Codes of primaries are those of ITU-T H.273, table 2.
 """
 
 from collections.abc import Mapping
@@ -12,19 +12,9 @@ from av.sidedata.sidedata import SideDataContainer
 from av.video.codeccontext import VideoCodecContext
 
 from psvideo.clip.record import shot_of
+from psvideo.clip.transfer import BY_H273
 from psvideo.model.turn import UPRIGHT, Turn, of_matrix
 
-TRANSFERS = {
-    1: "rec709",
-    4: "gamma22",
-    6: "rec709",
-    8: "linear",
-    13: "srgb",
-    14: "rec709",
-    15: "rec709",
-    16: "st2084",
-    18: "hlg",
-}
 GAMUTS = {1: "lin_rec709_scene", 9: "lin_rec2020_scene", 12: "lin_p3d65_scene"}
 """The colour interop ids of linear light with these primaries."""
 SPOKEN = {
@@ -77,7 +67,7 @@ def turn_of(frame: av.VideoFrame) -> tuple[Turn, str | None]:
 
 def transfer_of(tagged: av.VideoFrame | VideoCodecContext) -> str | None:
     """Return the name of the curve that a frame or a stream is tagged with, None where it says nothing known here."""
-    return TRANSFERS.get(int(tagged.color_trc or 0))
+    return BY_H273.get(int(tagged.color_trc or 0))
 
 
 def gamut_of(tagged: av.VideoFrame | VideoCodecContext) -> str | None:
