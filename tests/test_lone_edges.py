@@ -6,7 +6,7 @@ import pytest
 
 from psvideo.plates.align.doubt.lone_edges import FOLLOWED, InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.align.velocity.flow import Sketch
+from psvideo.plates.align.velocity.flow import TOE, Sketch
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import made
 from psvideo.solve.normals.illumination import Illumination
@@ -52,6 +52,18 @@ def test_the_edge_of_a_shadow_counts_a_tenth_of_that_of_a_square() -> None:
 def test_beside_a_shadow_that_only_one_light_throws_nothing_is_unsure(soft_px: float) -> None:
     shadow = cv2.GaussianBlur(square(4, 50), (0, 0), soft_px)
     assert not np.any(doubts(sketches([shadow, square(120, 50), square(120, 50)])))
+
+
+def wave(toward: float, height_px: float, length_px: float = 60.0) -> np.ndarray:
+    """The codes of a bare wavy wall under a light that comes from the left or the right, so far aside."""
+    slope = height_px * 2 * np.pi / length_px * np.cos(2 * np.pi * np.arange(COLS) / length_px)
+    light = np.maximum(0.8 - toward * slope, 0) / np.sqrt(1 + slope**2)
+    return np.broadcast_to(255 * (np.sqrt(0.8 * light + TOE) - TOE**0.5), (ROWS, COLS))
+
+
+@pytest.mark.parametrize("height_px", [4.0, 7.0])
+def test_waves_that_every_light_shades_otherwise_have_no_edges(height_px: float) -> None:
+    assert np.max(doubts(sketches([wave(toward, height_px) for toward in (-0.6, 0.0, 0.6)]))) < 0.001
 
 
 def test_less_of_it_counts_where_all_lights_agree_with_a_motion() -> None:

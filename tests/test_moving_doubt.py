@@ -10,7 +10,14 @@ from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.doubting import ThinSurface
-from psvideo.solve.normals.trust.moving_doubt import MOST_DEG, MovingDoubt, moved_deg, moving_doubt_deg
+from psvideo.solve.normals.trust.moving_doubt import (
+    MOST_DEG,
+    Checked,
+    MovingDoubt,
+    checked,
+    moved_deg,
+    moving_doubt_deg,
+)
 
 SIDE = 96
 HOW = MovingDoubt()
@@ -112,3 +119,58 @@ def test_what_all_around_is_turned_counts_more_than_its_own_angle() -> None:
     turned, known = np.full((SIDE, SIDE), 6, np.float32), np.ones((SIDE, SIDE), np.float32)
     doubt = moving_doubt_deg(turned, np.zeros_like(turned), known)
     np.testing.assert_allclose(doubt, HOW.own * 6 + 6 * 6 / HOW.around_deg, rtol=1e-4)
+
+
+def puzzled_by(left: float) -> Checked:
+    check = checked(facing(1.0), under_five(0.3, left))
+    assert check is not None
+    return check
+
+
+def test_one_normal_that_explains_more_than_three_plates_is_a_witness_and_of_three_lights_there_is_none() -> None:
+    assert puzzled_by(0.0).beyond == LIGHTS - 3
+    assert puzzled_by(0.0).puzzling.max() == 0
+    assert puzzled_by(0.005).puzzling.max() < 0.1
+    assert puzzled_by(0.2).puzzling.min() > 0.95
+    assert checked(facing(1.0), under_axes(np.full((3, SIDE, SIDE), 0.3, np.float32))) is None
+
+
+def test_what_looks_torn_is_a_crease_where_one_normal_explains_the_plates_of_five_lights() -> None:
+    """A crease is narrow; throughout, nothing speaks for what is torn."""
+    known, turned, torn = (np.full((SIDE, SIDE), value, np.float32) for value in (1.0, 0.6, 0.0))
+    torn[:, 46:50] = 9.0
+
+    def doubt(check: Checked | None) -> float:
+        return float(moving_doubt_deg(turned, torn, known, check=check)[48, 48])
+
+    none_torn = float(moving_doubt_deg(turned, np.zeros_like(torn), known)[48, 48])
+    assert doubt(puzzled_by(0.0)) < doubt(None) - 5
+    assert doubt(puzzled_by(0.2)) == pytest.approx(doubt(None), abs=0.5)
+    assert doubt(puzzled_by(0.0)) >= none_torn - 0.2
+    torn[:] = 9.0
+    assert doubt(puzzled_by(0.0)) > 10
+
+
+def test_normals_on_either_side_of_what_moves_are_torn_and_say_little_where_plates_agree() -> None:
+    known, torn = (np.full((SIDE, SIDE), value, np.float32) for value in (1.0, 0.0))
+    torn[:, 46:50] = 9.0
+    beside, elsewhere = np.zeros((2, SIDE, SIDE), np.bool_)
+    beside[:, 48:] = elsewhere[:, 56:] = True
+
+    def torn_doubt(turned_deg: float, moves: np.ndarray) -> np.ndarray:
+        turned = np.full((SIDE, SIDE), turned_deg, np.float32)
+        plain = moving_doubt_deg(turned, np.zeros_like(torn), known, moves)
+        return np.asarray((moving_doubt_deg(turned, torn, known, moves) - plain)[48], np.float32)
+
+    most = 9 - HOW.least_torn_deg
+    assert torn_doubt(0.1, beside)[48] < torn_doubt(0.1, elsewhere)[48] - 0.7 * most
+    assert torn_doubt(2.0, beside)[48] == pytest.approx(torn_doubt(2.0, elsewhere)[48], abs=0.1)
+    assert torn_doubt(0.1, beside)[47] >= most, "what it comes from behind"
+
+
+@pytest.mark.parametrize(("beyond", "times"), [(1, 2), (2, 3), (5, 3)])
+def test_lights_that_check_each_other_are_less_likely_to_fit_by_chance(beyond: int, times: int) -> None:
+    turned, known = np.full((SIDE, SIDE), 6, np.float32), np.ones((SIDE, SIDE), np.float32)
+    check = Checked(beyond=beyond, puzzling=np.zeros_like(turned))
+    doubt = moving_doubt_deg(turned, np.zeros_like(turned), known, check=check)
+    np.testing.assert_allclose(doubt, HOW.own * 6 + 6 * 6 / (times * HOW.around_deg), rtol=1e-4)

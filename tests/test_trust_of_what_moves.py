@@ -1,12 +1,17 @@
 """What plates show without alignment is trusted with it as well, where that is right: nothing is lost to caution."""
 
+import functools
+
 import numpy as np
 import pytest
 from bench.accuracy_measure import angles_deg
 from bench.accuracy_motion import ASLANT, BOX, UNALIGNED, Filmed, filmed, turn
 
 from psvideo.model.surface import Surface
-from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import made
+from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 
 BARE_BALL = {"mesh": "sphere", "height_m": 0.4, "albedo": 0.6}
@@ -44,3 +49,49 @@ def test_five_lights_whose_plates_one_normal_explains_are_trusted(
     assert aligned.error_deg is not None
     assert (trusted & (off_deg > FAR_OFF_DEG)).sum() < 0.03 * trusted.sum()
     assert (off_deg[trusted] <= 2 * np.maximum(aligned.error_deg[trusted].astype(np.float32), 1e-3)).mean() > 0.9
+
+
+PITCH_S, WAVE_PX, WAVE_PER_S, HEIGHT_PX = 0.01, 60.0, 9.0, 8.0
+DIRECTIONS = np.array([[0.61, 0.19, 0.766], [-0.47, 0.43, 0.766], [-0.14, -0.63, 0.766]])
+
+
+@functools.cache
+def spots(shape: tuple[int, int]) -> np.ndarray:
+    """An albedo that varies as skin does, by a tenth."""
+    rng, (rows, cols) = np.random.default_rng(8), np.mgrid[: shape[0], : shape[1]]
+    waves = (np.cos(x * cols + y * rows + turn) for x, y, turn in rng.normal(0, (0.2, 0.2, 3), (12, 3)))
+    return np.asarray(0.6 + 0.02 * sum(waves), np.float64)
+
+
+def waving(time_s: float, shape: tuple[int, int] = (128, 160)) -> np.ndarray:
+    """The normals of a sheet that fills the picture, at a time: waves run along it."""
+    rows, cols = np.mgrid[: shape[0], : shape[1]]
+    per_px = 2 * np.pi / WAVE_PX
+    along = HEIGHT_PX * per_px * np.cos(per_px * (cols - 0.35 * rows) - WAVE_PER_S * time_s)
+    across = 0.5 * HEIGHT_PX * per_px * np.cos(per_px * rows * 1.3 + 0.7 * WAVE_PER_S * time_s)
+    normals = np.stack([-along, -0.35 * along + across, np.ones(shape)], axis=-1)
+    return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True), np.float64)
+
+
+def test_a_sheet_in_waves_is_trusted_as_without_alignment_and_its_normals_are_better() -> None:
+    """Waves fall off otherwise under every light, which is no edge that only one of them shows."""
+    names, rng, plates = ("key", "left", "right"), np.random.default_rng(2), []
+    for number in (1, 2, 3):
+        for n, (name, direction) in enumerate(zip(names, DIRECTIONS, strict=True)):
+            time_s = (4 * (number - 2) + n - 1) * PITCH_S
+            light = 0.9 * spots((128, 160)) * np.maximum(waving(time_s) @ direction, 0)
+            picture = made(np.asarray(light + rng.normal(0, 0.003, light.shape), np.float32))
+            seen = np.ones(len(light), np.bool_)
+            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))
+    lit = Illumination(directions=DIRECTIONS, intensities=np.full((3, 1), 0.9), names=names)
+
+    def shown(how: Aligning) -> tuple[float, float]:
+        one = list(aligned(plates, names, how, first=1))[1]
+        moves = None if one.motion is None else one.motion.moves
+        surface = Solving(error=True).solve([p.image for p in one.plates], lit, unsure=one.unsure, moves=moves)
+        off_deg = angles_deg(surface.normals, waving(0.0))
+        return float((surface.valid & (off_deg < FAR_OFF_DEG)).mean()), float(off_deg[surface.shown].mean())
+
+    (right, off_deg), (plain_right, plain_deg) = shown(Aligning()), shown(UNALIGNED)
+    assert right > 0.95 * plain_right
+    assert off_deg < 0.5 * plain_deg

@@ -16,6 +16,9 @@ from psvideo.plates.align.velocity.flow import TOE, Codes, Flags, Sketch, Vector
 
 SMOOTH_PX, BESIDE_PX = 1.0, 3
 """Edges are looked for in sketches smoothed by the first, and found again over a window of the second."""
+SHADING_PX, STEEPEST = 11, np.float32(0.2)
+"""What falls off evenly over such a window, by no more than the second, is shading, and may be one light's alone: on a
+wave, a fold, a small ball. Edges are narrower or steeper."""
 ALONE = 2.5
 """An edge is alone where it is this many times what any other light shows of it: shading makes edges differ by less."""
 LEAST_EDGE, OF_NOISE = 0.04, 2.7
@@ -85,10 +88,12 @@ def _lone(shown: Sequence[InstantSketch], noise: float) -> Vectors:
 
 
 def _edges(one: InstantSketch, noise: float) -> tuple[Vectors, Vectors, Vectors]:
-    """Return steps in the logarithm of light over three pixels, the least that is one, and 1 where light is enough."""
+    """Return steps in the logarithm of light over three pixels, the least that is one and no shading, and 1 where light
+    is enough."""
     light = cv2.GaussianBlur(light_of(one.codes.astype(np.float32)), (0, 0), SMOOTH_PX)
     level = np.log(light + np.float32(TOE))
     across, down = (cv2.Sobel(level, cv2.CV_32F, *way, scale=3 / 8) for way in ((1, 0), (0, 1)))
+    even = (cv2.blur(np.clip(way, -STEEPEST, STEEPEST), (SHADING_PX,) * 2) for way in (across, down))
     least = np.float32(LEAST_EDGE) + np.float32(OF_NOISE / SCALE * noise) / np.sqrt(light + np.float32(TOE))
     window = np.ones((SHADOW_PX, SHADOW_PX), np.uint8)
     dim, bright = cv2.erode(light, window), cv2.dilate(light, window)
@@ -96,4 +101,4 @@ def _edges(one: InstantSketch, noise: float) -> tuple[Vectors, Vectors, Vectors]
     here = (shadow == 0) & (bright > np.float32(LEAST_LIT))
     if one.used is not None:
         here &= cv2.erode(one.used.view(np.uint8), window) > 0
-    return np.hypot(across, down).astype(np.float32), least, here.astype(np.float32)
+    return np.hypot(across, down).astype(np.float32), np.hypot(*even) + least, here.astype(np.float32)

@@ -26,7 +26,7 @@ from psvideo.solve.normals.trust.doubting import (
     signs_of,
     stored,
 )
-from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
+from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
 
@@ -75,7 +75,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     doubt, moving = doubt_deg(signs, how=how.doubting), None
     if turned_deg is not None:
         known = points.known.astype(np.float32)
-        moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, how=how.moving)
+        check = checked(points, one, noise)
+        moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, check=check, how=how.moving)
     nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
     usual = np.float32(how.doubting.own) * nearly
     at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0]
