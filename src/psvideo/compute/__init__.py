@@ -2,6 +2,6 @@
 
 ``compiled`` and ``parts`` compile, ``compile_count`` counts how much; ``heap`` sets up memory and libraries before they
 load, ``memory`` and ``spilled`` hold arrays (in files, where they are large), ``halves`` and ``symmetric`` are small
-loops that many rooms use; ``threads`` shares work, ``beside`` starts threads that the end of the process waits for,
-``progress`` shows how far work is.
+loops that many rooms use, ``ranks`` finds medians and quantiles; ``threads`` shares work, ``beside`` starts threads
+that the end of the process waits for, ``progress`` shows how far work is.
 """

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import quantile
 from psvideo.compute.spilled import let_go
 from psvideo.errors import UsageError, check_kind
 from psvideo.model.rig import Vector, three_numbers
@@ -145,5 +146,5 @@ def normal_colours(normals: NDArray[np.floating]) -> Pixels:
 
 def exposure_for(image: Image, *, white: float = 0.8) -> float:
     """Return the factor that puts the brightest hundredth of a picture's pixels at ``white``, for showing it only."""
-    bright = float(np.percentile(image, 99))
+    bright = quantile(image, 0.99)
     return white / bright if bright > 1e-6 else 1.0

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.model.surface import Surface
 
 Planes = NDArray[np.float32]
@@ -102,9 +103,9 @@ def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
     squares, levels = square[thin][inner[thin]], level[thin][inner[thin]]
     if len(squares) < LEVELS * 8:
         return np.zeros_like(level)
-    parts = np.array_split(np.argsort(levels), LEVELS)
-    at = [float(np.median(levels[part])) for part in parts]
-    noise = np.array([float(np.quantile(squares[part], LOW_SHARE)) / LOW_OF_MEAN for part in parts])
+    parts = rising_parts(levels, LEVELS)
+    at = [median(levels[part]) for part in parts]
+    noise = np.array([quantile(squares[part], LOW_SHARE) / LOW_OF_MEAN for part in parts])
     return np.interp(level, at, np.minimum.accumulate(noise[::-1])[::-1]).astype(np.float32)
 
 

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.model.coded import Image
 from psvideo.plates.ambient.ambient_blocks import times_rows
 
@@ -56,7 +57,7 @@ class AmbientChange:
     def is_steady(self, level: Image) -> bool:
         """Return whether hardly anything of this light, (row, col[, channel]) of blocks, changed by more than noise."""
         change = np.abs(self.gain[::SPARSE] - 1) * np.maximum(level[::SPARSE], 0)
-        return bool(np.quantile(change, 0.999) < STEADY and self.restarts.mean() < 1e-3)
+        return bool(quantile(change, 0.999) < STEADY and self.restarts.mean() < 1e-3)
 
 
 def _mean(picture: Image) -> Image:
@@ -80,7 +81,7 @@ def _gain(old: Image, new: Image, both: NDArray[np.bool_], *, block: int) -> Ima
 
 def _usual(step: Image) -> float:
     """Return the standard deviation of either sample of a step, by the quieter half, which texture spares."""
-    return 2.1 * float(np.percentile(np.abs(step), 25)) if step.size else 0.0
+    return 2.1 * quantile(np.abs(step), 0.25) if step.size else 0.0
 
 
 def _bent(change: Image) -> float:
@@ -95,8 +96,8 @@ def _noise(rest: Image, level: Image) -> tuple[np.float32, np.float32]:
     rest, level = rest[::step], level[::step]
     if len(rest) < 64:
         return np.float32(1e-12), np.float32(0)
-    order = np.array_split(np.argsort(level), 8)
+    order = rising_parts(level, 8)
     levels = np.array([np.mean(level[part]) for part in order])
-    variances = np.array([(1.4826 * np.median(np.abs(rest[part] - np.median(rest[part])))) ** 2 for part in order])
+    variances = np.array([(1.4826 * median(np.abs(rest[part] - median(rest[part])))) ** 2 for part in order])
     per_level, variance = np.polyfit(levels, variances, 1) if np.ptp(levels) > 1e-4 else (0.0, variances.mean())
     return np.float32(max(variance, variances.min(), 1e-12)), np.float32(max(per_level, 0.0))

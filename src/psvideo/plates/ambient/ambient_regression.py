@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import row_weights
@@ -182,9 +183,9 @@ def _judged(design: Design, series: Image) -> tuple[Flags, Image]:
 
 def _noise_by_level(variance: Image, level: Image) -> Image:
     """Return what noise leaves of a block as bright: read noise and photon noise, from the quieter blocks."""
-    order = np.array_split(np.argsort(level.ravel()), 8)
+    order = rising_parts(level, 8)
     levels = np.array([level.ravel()[part].mean() for part in order])
-    quiet = np.array([np.percentile(variance.ravel()[part], 30) for part in order])
+    quiet = np.array([quantile(variance.ravel()[part], 0.3) for part in order])
     slope, offset = np.polyfit(levels, quiet, 1) if np.ptp(levels) > 1e-4 else (0.0, float(quiet.mean()))
     floor = max(float(quiet.min()), 1e-12)
     return np.asarray(np.maximum(max(slope, 0.0) * level + offset, floor), np.float32)
@@ -200,7 +201,7 @@ def _without_noise(image: Image, noise: Image) -> Image:
 
 def _lee(plane: Image, noise: Image) -> Image:
     bend = plane[:, 2:] - 2 * plane[:, 1:-1] + plane[:, :-2]
-    most = float((1.4826 * np.median(np.abs(bend[::3]))) ** 2 / 6) if bend.size else 0.0  # with fine detail in it
+    most = float((1.4826 * median(np.abs(bend[::3]))) ** 2 / 6) if bend.size else 0.0  # with fine detail in it
     window = (WINDOW_PX, WINDOW_PX)
     mean = cv2.blur(plane, window)
     spread = np.maximum(cv2.blur(plane * plane, window) - mean * mean, 0)

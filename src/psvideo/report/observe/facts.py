@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import quantile
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import Round
@@ -75,14 +76,14 @@ def thinned_round(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     if mask is not None:
         subject = thinned(mask)
         return Seen(bright=bright, shown=shown, subject=subject, beyond=_beyond(most, subject))
-    lit = most > lit_from(most, min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99))))
+    lit = most > lit_from(most, min(LIT, DARKEST * quantile(most[::2, ::2], 0.99)))
     return Seen(bright=bright, shown=shown, subject=lit | holes_in(lit))
 
 
 def _beyond(most: NDArray[np.float32], subject: NDArray[np.bool_]) -> float:
     if not subject.any() or subject.all():
         return 0.0
-    inside, outside = (float(np.percentile(most[where], 99)) for where in (subject, ~subject))
+    inside, outside = (quantile(most[where], 0.99) for where in (subject, ~subject))
     return outside / max(inside, FAINT)
 
 

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median, quantile
 from psvideo.plates.mixing.mixture import Mixture
 
 SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
@@ -84,7 +85,7 @@ def _noise(grey: NDArray[np.float32]) -> float:
     """Return the standard deviation of noise, from what a median over neighbours takes away."""
     some = slice(None, None, EACH)
     off = grey[some, some] - np.asarray(cv2.medianBlur(grey, 3))[some, some]
-    return 1.4826 * float(np.median(np.abs(off)))
+    return 1.4826 * median(np.abs(off))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +109,7 @@ def _blur_between(slopes: _Slopes, first_px: float, again_px: float, *, noise: f
     right, down, steep = slopes.after(first_px)
     if first_px:
         noise /= 2 * np.sqrt(np.pi) * first_px  # what such a blur leaves of noise that is new in every pixel
-    edges = steep > max(NOISE_FACTOR * noise, 0.25 * float(np.quantile(steep[:, ::2, ::2], 1 - steepest)))
+    edges = steep > max(NOISE_FACTOR * noise, 0.25 * quantile(steep[:, ::2, ::2], 1 - steepest))
     rim = 4 + round(2 * again_px)
     edges[:, :rim], edges[:, -rim:], edges[:, :, :rim], edges[:, :, -rim:] = False, False, False, False
     if edges.sum() < LEAST_EDGES:
@@ -126,7 +127,7 @@ def _blur_between(slopes: _Slopes, first_px: float, again_px: float, *, noise: f
         return None
     ratios = np.maximum((along[0][long] / along[1][long]) ** 2, 1 + 1e-3)
     blur_px = np.sqrt(np.maximum(again_px**2 - ratios * first_px**2, 0) / (ratios - 1))
-    return float(np.quantile(blur_px, SHARPEST))
+    return quantile(blur_px, SHARPEST)
 
 
 def _each(function: Callable[[NDArray[np.float32]], NDArray[np.float32]], squares: Squares) -> Squares:

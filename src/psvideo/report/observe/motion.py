@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median, quantile
 from psvideo.plates.light_plate import LightPlate
 
 WIDTH_PX = 480
@@ -62,7 +63,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     grey = np.ascontiguousarray(some if some.ndim == 2 else some[..., 1])
     if step > 1:
         grey = np.asarray(cv2.resize(grey, (cols // step, len(grey)), interpolation=cv2.INTER_AREA), np.float32)
-    white = white or min(max(1.2 * float(np.percentile(grey[::2, ::2], 99.5)), 1e-3), plate.saturation)
+    white = white or min(max(1.2 * quantile(grey[::2, ::2], 0.995), 1e-3), plate.saturation)
     light = np.clip(grey / np.float32(white), 0, 1) + np.float32(TOE)
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
@@ -88,7 +89,7 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     if followed.sum() < FOLLOWED * changed.sum():
         return Motion(speed_px_s=None, share=float(changed.mean()))
     way = np.hypot(forward[..., 0], forward[..., 1])[followed] * before.scale
-    speed = float(np.quantile(way, FASTEST)) / abs(after.time_s - before.time_s)
+    speed = quantile(way, FASTEST) / abs(after.time_s - before.time_s)
     return Motion(speed_px_s=speed, share=float(returns.mean()))
 
 
@@ -96,10 +97,10 @@ def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np
     """Return where two pictures differ by more than noise, (row, col). A change of all light by one factor is none."""
     early, late = one[::2, ::2], other[::2, ::2]  # medians of a quarter are as good
     bright = early > 30
-    level = float(np.median(late[bright] / early[bright])) if bright.any() else 1.0
+    level = median(late[bright] / early[bright]) if bright.any() else 1.0
     change = other - one * np.float32(level)
     mean = cv2.blur(change, (3, 3))
-    noise = 1.4826 * float(np.median(np.abs(change - mean)[::2, ::2])) * np.sqrt(9 / 8)
+    noise = 1.4826 * median(np.abs(change - mean)[::2, ::2]) * np.sqrt(9 / 8)
     squares = cv2.blur(mean * mean, (8, 8))
     local = np.sqrt(np.maximum(squares, 0))  # running sums may leave a little less than nothing
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import Masks
+from psvideo.compute.ranks import quantile
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
@@ -39,7 +40,7 @@ WEAK_BESIDE = 1 / 8
 
 
 def _evenness(image: NDArray[np.float32]) -> float:
-    low, high = np.percentile(image, [5, 95])
+    low, high = (quantile(image, share) for share in (0.05, 0.95))
     return float(low / max(high, FAINT))
 
 

@@ -6,6 +6,7 @@ Ambient light that nothing took off, and light by way of other surfaces, stay th
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import quantile
 from psvideo.compute.spilled import thin
 from psvideo.model.camera import FloatArray
 from psvideo.model.surface import Surface
@@ -34,11 +35,11 @@ def shadow_light(
     measured = surface.measured[::step, ::step]
     if not measured.any():
         return None
-    clear = measured & (albedo > LEAST_ALBEDO * np.percentile(albedo[measured], 90))
+    clear = measured & (albedo > LEAST_ALBEDO * quantile(albedo[measured], 0.9))
     strengths = np.linalg.norm(ways, axis=1)
     samples = []
     for plate, known, way, strength in zip(bright, shown, ways, strengths, strict=True):
         away = clear & known & (np.einsum("rcx,x->rc", normals, way) < FACING_AWAY * strength)
         samples.append(plate[away] / (albedo[away] * strength))
     light = np.concatenate(samples)
-    return float(np.quantile(light, LOW)) if len(light) >= LEAST_SAMPLES else None
+    return quantile(light, LOW) if len(light) >= LEAST_SAMPLES else None

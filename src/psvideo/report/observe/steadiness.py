@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.model.surface import Surface
 from psvideo.report.observe.thinned import thin_surface
 
@@ -62,9 +63,9 @@ def change(before: Sample, after: Sample) -> Change | None:
     one, other = (sample.normals.reshape(-1, 3)[some] for sample in (before, after))
     relative = after.albedo.ravel()[some] / before.albedo.ravel()[some] - 1
     return Change(
-        normals_deg=float(np.median(_angle_deg(one, other))),
-        albedo_percent=float(100 * np.median(np.abs(relative))),
-        level_percent=float(100 * np.median(relative)),
+        normals_deg=median(_angle_deg(one, other)),
+        albedo_percent=float(100 * median(np.abs(relative))),
+        level_percent=float(100 * median(relative)),
     )
 
 

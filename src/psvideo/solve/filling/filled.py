@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.bucket_queue import queue_for
@@ -69,7 +70,7 @@ def _errors(surface: Surface, where: NDArray[np.int32], lights: Bytes, away: Flo
         return None
     around = errors[::THIN, ::THIN].astype(np.float32)
     let_go(errors)
-    typical_deg = TIMES_TYPICAL * np.float32(np.median(around[around > 0])) if (around > 0).any() else np.float32(0)
+    typical_deg = TIMES_TYPICAL * np.float32(median(around[around > 0])) if (around > 0).any() else np.float32(0)
     for first in range(0, len(where), AT_ONCE):
         some = slice(first, first + AT_ONCE)
         rows, cols = where[some].T

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Samples
@@ -87,12 +88,12 @@ def _by_level(detail: Values, level: Values, rounding: Values) -> tuple[Values, 
     """Return LEVELS levels, and the variance there that differences show, each as large as noise at its level makes it;
     ``rounding`` is the squared distance of codes."""
     detail, level, rounding = detail.ravel() ** 2, level.ravel(), rounding.ravel() / 12
-    parts = np.array_split(np.argsort(level), LEVELS)
+    parts = rising_parts(level, LEVELS)
     at = np.array([(level[part[(len(part) - 1) // 2]] + level[part[len(part) // 2]]) / 2 for part in parts])  # medians
-    found = np.array([float(np.quantile(detail[part], LOW_SHARE)) / LOW_OF_VARIANCE for part in parts])
+    found = np.array([quantile(detail[part], LOW_SHARE) / LOW_OF_VARIANCE for part in parts])
     if not rounding.any():
         return at, found
-    rounded = np.array([float(np.median(rounding[part])) for part in parts])
+    rounded = np.array([median(rounding[part]) for part in parts])
     return at, np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
 
 
@@ -102,7 +103,7 @@ def _line(at: Values, found: Values) -> PlateNoise:
     if at.max() <= 0:  # no light anywhere
         return PlateNoise(read=max(float(found[darkest]), LEAST**2), photon=0.0)
     rise = (found - found[darkest]) / np.maximum(at - at[darkest], 1e-6)
-    photon = max(float(np.median(rise[bright])), 0.0)
+    photon = max(median(rise[bright]), 0.0)
     read = max(float(found[darkest]) - photon * max(float(at[darkest]), 0.0), LEAST**2)
     return PlateNoise(read=read, photon=photon)
 
@@ -119,11 +120,11 @@ def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) 
     bright = at > BRIGHT * at.max()
     if at.max() <= 0 or not bright.any():
         return alone
-    level = float(np.median(at[bright]))
-    share = float(np.median(found[bright])) / alone.at(level) ** 2
+    level = median(at[bright])
+    share = median(found[bright]) / alone.at(level) ** 2
     left = min(alone.read, max(_line(at, found).read, share * alone.read))
     read = left + (alone.read - left) * dark_share
-    photon = float(np.median(np.maximum(found[bright] - left, 0) / at[bright]))
+    photon = median(np.maximum(found[bright] - left, 0) / at[bright])
     return PlateNoise(read=read, photon=min(photon, max(alone.at(level) ** 2 - read, 0.0) / level))
 
 
@@ -143,35 +144,47 @@ def _fine(
     firsts = np.arange(0, rows - 2, step)
     part = rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
     part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
-    count = len(firsts) * (cols - 2)
-    each, lines = max(count // pixels, 1), part.reshape(3, len(firsts), cols)
-    around = np.empty((3, -(-count // each), 3))
-    for place in range(3):
-        around[..., place] = lines[:, :, place : cols - 2 + place].reshape(3, count)[:, ::each]
-    around -= black_level
-    around *= scale
-    gaps = _gaps_of_codes(around)
-    if gaps is not None:
-        around += gaps * (np.random.default_rng(number).random(around.shape) - 0.5)
-    top, middle, bottom = around
-    down = top - 2 * middle + bottom
-    fine = down[:, 0] - 2 * down[:, 1] + down[:, 2]
-    three = top + middle + bottom
-    level = (three[:, 0] + three[:, 1] + three[:, 2]) / 9  # the same noise is in both, and not correlated
-    return fine / 6, level, np.zeros_like(level) if gaps is None else gaps[1, :, 1] ** 2
+    each = max(len(firsts) * (cols - 2) // pixels, 1)
+    lines = part.reshape(3, len(firsts), cols) - np.float32(black_level)
+    lines *= np.float32(scale)
+    codes = _codes_in(lines)
+    if codes is None:
+        fine, level = _differences(lines, each)
+        return fine, level, np.zeros_like(level)
+    lines = lines.astype(np.float64)
+    gaps = _gaps_between(codes, lines)
+    lines += gaps * (np.random.default_rng(number).random(lines.shape) - 0.5)
+    fine, level = _differences(lines, each)
+    return fine, level, gaps[1, :, 1:-1].ravel()[::each] ** 2
 
 
-def _gaps_of_codes(values: Values) -> Values | None:
-    """Return how far from each other codes are at every value, or None where values are none that a file rounded."""
+def _differences(lines: NDArray[np.floating], each: int) -> tuple[Values, Values]:
+    """Return of ``lines`` (3, line, col), of which three lie beside each other, the second differences as their squares
+    hold the variance, and the levels there; of every ``each``-th place."""
+    top, middle, bottom = lines
+    down, three = top - 2 * middle + bottom, top + middle + bottom
+    fine = down[:, :-2] - 2 * down[:, 1:-1] + down[:, 2:]
+    level = three[:, :-2] + three[:, 1:-1] + three[:, 2:]  # the same noise is in both, and not correlated
+    return fine.ravel()[::each] / np.float64(6), level.ravel()[::each] / np.float64(9)
+
+
+def _codes_in(values: NDArray[np.floating]) -> Values | None:
+    """Return the codes that values are, in rising order, or None where they are none that a file rounded."""
     some = values.ravel()[:: max(values.size // CODE_SAMPLES, 1)]
-    codes = np.unique(some)
+    codes = np.unique(some).astype(np.float64)
     if not LEAST_CODES <= len(codes) <= len(some) / 2:
         return None
     gaps = np.diff(codes)
     ratios = gaps[1:] / gaps[:-1]
-    fine_or_none = gaps.max() < LEAST or np.median(gaps) > COARSEST
+    fine_or_none = gaps.max() < LEAST or median(gaps) > COARSEST
     if fine_or_none or np.mean((ratios < ALIKE) & (ratios > 1 / ALIKE)) < 0.5:
         return None
+    return codes
+
+
+def _gaps_between(codes: Values, values: Values) -> Values:
+    """Return how far from each other codes are at every value."""
+    gaps = np.diff(codes)
     beside = np.pad(gaps, 1, mode="edge")
     gaps = np.minimum(gaps, np.minimum(beside[:-2], beside[2:]))  # some codes may not occur
     return np.asarray(np.interp(values, codes[:-1] + gaps / 2, gaps))

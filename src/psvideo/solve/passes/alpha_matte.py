@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.solve.filling.filled import holes_in
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise
 from psvideo.solve.normals.solving import CERTAIN
@@ -67,7 +68,7 @@ def lit_from(most: Floats, level: float) -> float:
     dark = logs < edges[best + 1]
     if between[best] < SEPARATE * spread or not dark.any() or dark.all():
         return level
-    times = float(np.exp(np.median(logs[~dark]) - np.median(logs[dark])))
+    times = float(np.exp(median(logs[~dark]) - median(logs[dark])))
     border = np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]])
     apart = times >= TIMES_BRIGHTER and border.mean() >= AT_BORDER
     return max(float(np.exp(edges[best + 1])), level) if apart else level

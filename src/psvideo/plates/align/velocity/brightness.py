@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.plates.align.velocity.flow import TOE, Sketch, Vectors
 
 LIT, NEAR_WHITE = 32, 250
@@ -34,12 +35,12 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     lit = (np.minimum(one, other) > LIT) & (np.maximum(one, other) < NEAR_WHITE)
     if np.count_nonzero(lit) < FEWEST:
         return after
-    gain = float(np.median(light_of(one[lit]) / light_of(other[lit])))
-    change = float(np.median(np.abs(other[lit] - one[lit])))
+    gain = median(light_of(one[lit]) / light_of(other[lit]))
+    change = median(np.abs(other[lit] - one[lit]))
     most = float(np.abs(_brightened(EVERY_CODE, gain) - EVERY_CODE).max())
     if most <= (1 - EXPLAINED) * change:  # so little that it leaves more: at rest
         return after
-    left = float(np.median(np.abs(_brightened(other[lit], gain) - one[lit])))
+    left = median(np.abs(_brightened(other[lit], gain) - one[lit]))
     if left >= EXPLAINED * change:
         return after
     table = np.rint(_brightened(EVERY_CODE, gain)).astype(np.uint8)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import quantile
 from psvideo.model.coded import Image
 from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
@@ -62,7 +63,7 @@ class Sketch:
 
 def white_of(plate: LightPlate) -> float:
     """Return the light that becomes the brightest code, from a light's first plate."""
-    return float(np.clip(1.2 * np.percentile(_grey(plate.picture.thinned(4)), 99.5), LEAST_WHITE, plate.saturation))
+    return float(np.clip(1.2 * quantile(_grey(plate.picture.thinned(4)), 0.995), LEAST_WHITE, plate.saturation))
 
 
 def sketch_of(plate: LightPlate, *, white: float) -> Sketch:

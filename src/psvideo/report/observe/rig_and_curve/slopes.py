@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
 from psvideo.report.observe.thinned import thin_surface
@@ -107,7 +108,7 @@ def noise_of_slopes(valid: NDArray[np.bool_], normals: NDArray[np.float32]) -> f
     inside = cv2.erode(valid.astype(np.uint8), np.ones((7, 7), np.uint8), borderValue=0) > 0
     if not inside.any():
         return 0.0
-    left = [np.median(np.abs(cv2.filter2D(normals[..., axis], -1, FINEST)[inside])) for axis in (0, 1)]
+    left = [median(np.abs(cv2.filter2D(normals[..., axis], -1, FINEST)[inside])) for axis in (0, 1)]
     errors = np.array(left) / (6 * NORMAL_MEDIAN)
     return float((errors**2).sum() / (8 * np.pi * BLUR_PX**4))
 

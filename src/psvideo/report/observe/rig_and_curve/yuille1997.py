@@ -13,6 +13,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from psvideo.compute.ranks import median
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig
 from psvideo.report.observe.rig_and_curve.slopes import (
@@ -213,7 +214,7 @@ def _reweighted(slopes: FloatArray, still: FloatArray, found: FloatArray) -> tup
     leave, and how wide that is. ``slopes`` (unknown, point) is what each adds."""
     for _ in range(ROUNDS):
         left = still + np.einsum("ip,i->p", slopes, found)
-        width = OUTLIER * float(np.median(np.abs(left))) / NORMAL_MEDIAN + 1e-12
+        width = OUTLIER * median(np.abs(left)) / NORMAL_MEDIAN + 1e-12
         weighted = slopes / (1 + (left / width) ** 2)
         squares, pull = weighted @ slopes.T, np.einsum("ip,p->i", weighted, still)  # BLAS would cut sums by threads
         before, found = found, -_solved(squares, pull)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
@@ -138,7 +139,7 @@ def _fitted(points: _Points, normals: Values) -> Reflectance | None:
     known = sizes > 0
     points = points.only(known)
     g = normals[known] * sizes[known, None]
-    model, explained, typical = np.zeros(4), 0.0, float(np.median(sizes[known])) if known.any() else 0.0
+    model, explained, typical = np.zeros(4), 0.0, median(sizes[known]) if known.any() else 0.0
     if len(g) < LEAST_POINTS:
         return None
     for turn in range(ALTERNATIONS):
@@ -191,7 +192,7 @@ def _model(points: _Points, g: Values, typical: float) -> tuple[Values, float]:
         left = parts - _explained(points.towards, weights, parts)
         own, others = left[0], left[1:]
         rest = own - np.tensordot(model, others, axes=1)
-        spread = max(float(1.48 * np.median(np.abs(rest[points.counts > 0]))), 1e-4)
+        spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), 1e-4)
         per = COUNTED / spread**2 / points.counts.sum()
         square = per * np.einsum("lp,klp,jlp->kj", weights, others, others) + np.diag(np.array(PRIOR) ** -2)
         model = _bounded(square, per * np.einsum("lp,klp,lp->k", weights, others, own))
