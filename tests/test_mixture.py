@@ -105,6 +105,17 @@ def test_parts_of_a_picture_are_those_of_the_whole(name: str) -> None:
     assert np.abs(picture.halved() - grey).max() < 1e-6
 
 
+@pytest.mark.parametrize("name", TONES)
+def test_small_pictures_of_what_is_not_clipped_are_means_too(name: str) -> None:
+    picture = shot(name, seed=3)
+    dim = tuple(replace(frame, codes=np.asarray(frame.codes) // 2) for frame in picture.frames)
+    picture = replace(picture, frames=dim)
+    image = picture.image()
+    assert not picture.clipped().any()
+    grey = image.reshape(ROWS // 2, 2, COLS // 2, 2, -1).mean(axis=(1, 3, 4))
+    assert np.abs(picture.halved() - grey).max() < 2e-6
+
+
 def left_in_files(picture: Mixture, folder: Path, *, stays_open: bool = True) -> Mixture:
     """The same picture of frames that lie in files, behind some bytes of something else."""
     frames = []

@@ -19,12 +19,12 @@ EMPTY = np.empty(0, np.uint16)
 
 
 class InFiles(NamedTuple):
-    """How rows are read of pictures that lie in open files: each when it is added, into room that stays in a core's
-    first cache."""
+    """How rows are read of pictures that lie in open files: each when it is added, or two that are added together, into
+    room that stays in a core's first cache."""
 
     opened: Places  # (frame,) files; empty where pictures lie in memory
     reader: int  # the address of the C library's pread
-    room: int  # that of room for a row
+    room: int  # that of room for two rows
     missed: Places  # (1,) becomes 1 where a row could not be read whole
 
 
@@ -71,12 +71,23 @@ def lent_mix(mix: MixtureArrays) -> MixtureArrays:
 @FUSED.inlined
 def row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
     """A frame's row in its codes, read if it lies in a file."""
-    end = (row + 1) * mix.samples
+    return _codes_of(mix, frame, row, mix.samples)
+
+
+@FUSED.inlined
+def two_rows_of(mix: MixtureArrays, frame: int, row: int) -> Any:
+    """A frame's row and the one after it as one line of codes, read if they lie in a file."""
+    return _codes_of(mix, frame, row, 2 * mix.samples)
+
+
+@FUSED.inlined
+def _codes_of(mix: MixtureArrays, frame: int, row: int, count: int) -> Any:
+    begin = row * mix.samples
     if mix.files.opened.shape[0]:
-        size = mix.samples * mix.like.itemsize
-        _read(mix.files, mix.files.opened[frame], mix.frames[frame] + row * size, size)
-        return carray(pointer(mix.files.room, mix.like), mix.samples)[0 : mix.samples]
-    return carray(pointer(mix.frames[frame], mix.like), end)[row * mix.samples : end]
+        size = mix.like.itemsize
+        _read(mix.files, mix.files.opened[frame], mix.frames[frame] + begin * size, count * size)
+        return carray(pointer(mix.files.room, mix.like), count)[0:count]
+    return carray(pointer(mix.frames[frame], mix.like), begin + count)[begin : begin + count]
 
 
 @FUSED.called

@@ -61,7 +61,7 @@ class ReadyMixture:
         if None in places:
             return False
         opened, begins = np.array(places, np.intp).T.copy()
-        room = np.zeros(self.mix.samples, self.mix.like.dtype)
+        room = np.empty(2 * self.mix.samples, self.mix.like.dtype)
         files = InFiles(opened, READER, room.ctypes.data, np.zeros(1, np.intp))
         loop(self.mix._replace(frames=begins, files=files), *arguments)
         return not files.missed[0]

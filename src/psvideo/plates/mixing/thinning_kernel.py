@@ -7,10 +7,19 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent, pointer
+from psvideo.plates.mixing.adding_kernel import some_reach
 from psvideo.plates.mixing.mixing_kernel import CLIPPED, WHOLE, mix_row
-from psvideo.plates.mixing.mixture_arrays import Floats, InFiles, MixtureArrays, lent_mix, level_row, row_of
+from psvideo.plates.mixing.mixture_arrays import (
+    Floats,
+    InFiles,
+    MixtureArrays,
+    lent_mix,
+    level_row,
+    row_of,
+    two_rows_of,
+)
 
-HALF = np.float32(0.5)
+ZERO, HALF = np.float32(0), np.float32(0.5)
 
 
 @FUSED.kept
@@ -66,20 +75,60 @@ def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Fl
     bare = _without_levels(given)
     upper, lower = np.empty(given.samples, np.float32), np.empty(given.samples, np.float32)
     share = np.float32(1 / (4 * channels))
+    straight = given.zero.shape[1] * given.zero.shape[2] == 1 and not given.halves and not given.table.size
     for row in range(first, last):
-        above, below = mix_row(bare, 2 * row, upper), mix_row(bare, 2 * row + 1, lower)
+        added, black = _add_codes(given, 2 * row, upper) if straight else (False, ZERO)
+        above = below = WHOLE
+        if not added:
+            black = ZERO
+            above, below = mix_row(bare, 2 * row, upper), mix_row(bare, 2 * row + 1, lower)
         whole = above != CLIPPED and below != CLIPPED
         if not whole:
             mix_row(given, 2 * row, upper)
             mix_row(given, 2 * row + 1, lower)
-        for sample in range(given.samples):
-            upper[sample] += lower[sample]
-        _add_neighbours(upper, made[row], channels, share)
+        if not added:
+            for sample in range(given.samples):
+                upper[sample] += lower[sample]
+        _add_neighbours(upper, made[row], channels, share, black * HALF)
         for level in range(given.levels.shape[0] if whole else 0):
             if above == WHOLE:
                 _take_off_narrow(given, level, 2 * row, made[row])
             if below == WHOLE:
                 _take_off_narrow(given, level, 2 * row + 1, made[row])
+
+
+@FUSED.inlined
+def _add_codes(mix: MixtureArrays, row: int, pairs: Floats) -> tuple[bool, np.float32]:
+    """Add up two rows as they are in their codes: return whether that could be, and what is too much for black in every
+    sum; not where a sample may be clipped, or one of the rows was not seen.
+
+    Linear codes of one black level: two rows cost one pass, where ``mix_row`` takes two for each.
+    """
+    begun_above, begun_below, black = False, False, ZERO
+    for frame in range(mix.frames.shape[0]):
+        above, below = mix.coefficients[frame, row], mix.coefficients[frame, row + 1]
+        if above == ZERO and below == ZERO:
+            continue
+        codes, zero, gain = two_rows_of(mix, frame, row), mix.zero[frame, 0, 0], mix.gain[frame, 0, 0]
+        if some_reach(codes, min(mix.clips_from / gain + zero, mix.most), mix.most):
+            return False, black
+        above, below = above * gain, below * gain
+        black += (above + below) * zero
+        _add_two_rows(codes, above, below, pairs, begun_above or begun_below)
+        begun_above, begun_below = begun_above or above != ZERO, begun_below or below != ZERO
+    return begun_above and begun_below, black
+
+
+@FUSED.inlined
+def _add_two_rows(codes: Any, above: np.float32, below: np.float32, pairs: Floats, begun: bool) -> None:
+    count = pairs.shape[0]
+    upper, lower = codes[0:count], codes[count : 2 * count]
+    if begun:
+        for sample in range(count):
+            pairs[sample] += above * np.float32(upper[sample]) + below * np.float32(lower[sample])
+    else:
+        for sample in range(count):
+            pairs[sample] = above * np.float32(upper[sample]) + below * np.float32(lower[sample])
 
 
 @FUSED.inlined
@@ -102,15 +151,15 @@ def _take_off_narrow(mix: MixtureArrays, level: int, row: int, out: Floats) -> N
 
 
 @FUSED.inlined
-def _add_neighbours(pairs: Floats, out: Floats, channels: int, share: np.float32) -> None:
-    """Two neighbouring pixels' channels added up, times their share."""
+def _add_neighbours(pairs: Floats, out: Floats, channels: int, share: np.float32, less: np.float32) -> None:
+    """Two neighbouring pixels' channels added up, times their share, and so much ``less``."""
     if channels == 3:
         for col in range(out.shape[0]):
             a, b, c = pairs[6 * col], pairs[6 * col + 1], pairs[6 * col + 2]
-            out[col] = (a + b + c + pairs[6 * col + 3] + pairs[6 * col + 4] + pairs[6 * col + 5]) * share
+            out[col] = (a + b + c + pairs[6 * col + 3] + pairs[6 * col + 4] + pairs[6 * col + 5]) * share - less
         return
     for col in range(out.shape[0]):
         total = np.float32(0)
         for sample in range(2 * col * channels, 2 * (col + 1) * channels):
             total += pairs[sample]
-        out[col] = total * share
+        out[col] = total * share - less
