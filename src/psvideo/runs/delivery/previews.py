@@ -22,6 +22,7 @@ from psvideo.model.choices import Codec, Preview
 from psvideo.model.quantities import QUANTITIES
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import exposure_for, smaller, srgb
+from psvideo.pictures.relit_kernel import shown_by
 from psvideo.runs.delivery.relit import TURN_S, WIDTH_PX, read_relit
 
 Pixels = NDArray[np.uint8]
@@ -94,7 +95,7 @@ def _picture(preview: Preview, one: Shown, exposure: float, fps: Fraction) -> Pi
 def _relit(one: Shown, exposure: float, fps: Fraction) -> Pixels:
     kept = None if one.relit is None else np.load(one.relit)
     picture = read_relit(one.files["normals"], one.files["albedo"], one.number, fps) if kept is None else kept
-    return np.asarray(_shown_as(exposure)[picture.view(np.uint16)])
+    return shown_by(_shown_as(exposure), picture)
 
 
 @lru_cache(maxsize=1)
@@ -102,7 +103,7 @@ def _shown_as(exposure: float) -> Pixels:
     """Return the sRGB code of every half float, by its bits."""
     halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
     light = np.nan_to_num(halves, nan=0.0, posinf=HALF_MAX, neginf=0.0)
-    return srgb(light[:, None], exposure=exposure)[:, 0, 0]
+    return np.ascontiguousarray(srgb(light[:, None], exposure=exposure)[:, 0, 0])
 
 
 def _sheet(one: Shown, exposure: float) -> Pixels:
