@@ -151,10 +151,10 @@ def _fine(
     if codes is None:
         fine, level = _differences(lines, each)
         return fine, level, np.zeros_like(level)
-    lines = lines.astype(np.float64)
-    gaps = _gaps_between(codes, lines)
-    lines += gaps * (np.random.default_rng(number).random(lines.shape) - 0.5)
-    fine, level = _differences(lines, each)
+    blurred = lines.astype(np.float64)
+    gaps = _gaps_between(codes, blurred)
+    blurred += gaps * (np.random.default_rng(number).random(lines.shape) - 0.5)
+    fine, level = _differences(blurred, each)
     return fine, level, gaps[1, :, 1:-1].ravel()[::each] ** 2
 
 
