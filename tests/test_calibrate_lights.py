@@ -237,3 +237,70 @@ def test_a_guessed_rig_says_so_in_the_file_and_on_the_terminal(
     lights = read_rig(out).lights
     assert off_deg(np.array([light.direction for light in lights]), chrome).mean() < 20
     assert main(["calibrate", "guess", str(folder), "-o", str(tmp_path / "x.toml"), "--prior", "luck"]) == 2
+
+
+@pytest.fixture
+def shot(tmp_path: Path) -> tuple[Path, Path]:
+    """A folder of stills of a matte ball, one per light, and the rig of these lights."""
+    directions = ways(4)
+    for name, image in zip("abcd", sphere_pictures(directions, np.full((4, 3), 0.8)).images, strict=True):
+        write_exr(tmp_path / "stills" / f"{name}.exr", {c: image[..., k] for k, c in enumerate("RGB")}, half=False)
+    lights = tuple(Light(name=name, direction=(x, y, z)) for name, (x, y, z) in zip("abcd", directions, strict=True))
+    (tmp_path / "known.toml").write_text(format_rig(Rig(lights=lights)))
+    return tmp_path / "stills", tmp_path / "known.toml"
+
+
+@pytest.mark.parametrize("out", ["rig", "rig.lp", "rig.png"])
+def test_a_rig_gets_a_name_under_which_it_can_be_read(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str], out: str
+) -> None:
+    """A list of lights is read for what it is not, and a .png would be its own picture's name."""
+    path = shot[0].with_name(out)
+    assert main(["calibrate", "matte-sphere", str(shot[0]), "-o", str(path)]) == 2
+    assert "expected a name that ends in .toml, such as" in capsys.readouterr().err
+    assert not path.exists()
+
+
+def test_a_calibration_that_failed_is_repeated_without_force(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = shot[0].with_name("rig.toml")
+    words = ["calibrate", "matte-sphere", str(shot[0]), "-o", str(rig)]
+    assert main([*words, "--circle", "30,30,20"]) == 1
+    assert rig.with_suffix(".png").exists(), "it shows what was tried"
+    capsys.readouterr()
+    assert main([*words, "--circle", "95.3,71.8,60"]) == 0
+    assert main([*words, "--circle", "95.3,71.8,60"]) == 2, "a picture that belongs to a rig stays"
+    rig.unlink()
+    rig.with_suffix(".png").write_bytes(b"somebody's own")
+    assert main(words) == 2
+
+
+def test_what_is_no_white_target_gives_no_strengths(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = shot[0].with_name("rig.toml")
+    assert main(["calibrate", "flat-field", str(shot[0]), "--rig", str(shot[1]), "-o", str(out)]) == 1
+    assert "as where the pictures show no white target, or more than it" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_rig_and_falloff_are_never_written_to_one_file(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(shot[0].with_name("rig.toml"))
+    words = ["calibrate", "flat-field", str(shot[0]), "--rig", str(shot[1]), "-o", out, "--flat", out]
+    assert main(words) == 2
+    assert "--out and --flat both name" in capsys.readouterr().err
+
+
+def test_pictures_that_a_rig_knows_nothing_of_are_named_with_the_rig(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (shot[0] / "d.exr").rename(shot[0] / "top.exr")
+    out = shot[0].with_name("rig.toml")
+    assert main(["calibrate", "flat-field", str(shot[0]), "--rig", str(shot[1]), "-o", str(out)]) == 1
+    assert (
+        "known.toml: The rig has no light named 'top', which the plan flashes or pictures are"
+        in capsys.readouterr().err
+    )

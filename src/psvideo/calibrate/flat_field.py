@@ -22,6 +22,8 @@ from psvideo.model.rig import Light, Rig
 LEAST_SHARE = 0.5
 """Share of the target's pixels that must be unsaturated and seen."""
 LEAST_COSINE = 0.05
+MOST_ERROR = 0.5
+"""Intensities less certain than this share of themselves are none: no flat target differs so much from row to row."""
 MOST_PIXELS = 20_000
 ROUNDS = 5
 
@@ -55,11 +57,19 @@ def measure_flat_field(
 ) -> list[FlatLight]:
     """Return every light's intensity. ``ground`` is where the target stands, needed where lights are near.
 
-    Raises PsvideoError where the rig lacks a light, where one does not reach the target, or where too much of it is
-    saturated.
+    Raises PsvideoError where the rig lacks a light, where one does not reach the target, where too much of it is
+    saturated, or where what is seen is no flat target.
     """
     lights = rig.select(pictures.names)
-    return [_flat(light, n, pictures, target, ground) for n, light in enumerate(lights)]
+    found = [_flat(light, n, pictures, target, ground) for n, light in enumerate(lights)]
+    worst = max(found, key=lambda one: one.intensity_error)
+    if worst.intensity_error > MOST_ERROR:
+        raise PsvideoError(
+            f"Light {worst.name!r}: its intensity comes out at {worst.intensity.mean():.3g} +- "
+            f"{worst.intensity_error:.0%}, as where the pictures show no white target, or more than it. Expected a "
+            "matte white one that faces the camera or lies in the rig's plane: name its part of the picture with `box`."
+        )
+    return found
 
 
 def with_intensities(rig: Rig, found: list[FlatLight]) -> Rig:

@@ -100,8 +100,8 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
         rig.toml, an .lp list (RTI), DiLiGenT's light_directions.txt with light_intensities.txt beside it, or a plain
         list of unit vectors with its count on the first line.
     plan_lights
-        Names for the lights of lists that name none of these, in order; left out, lights are called as the list calls
-        them or their pictures, else they are numbered.
+        The lights that are needed; names for the lights of lists that name none of these, in order. Left out, lights
+        are called as the list calls them or their pictures, else they are numbered.
 
     Returns
     -------
@@ -125,7 +125,12 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
     """
     path = path_of("path", path)
     if path.suffix == ".toml":
-        return _in_front(parse_rig(read_text(path), source=str(path)), path)
+        rig = _in_front(parse_rig(read_text(path), source=str(path)), path)
+        try:
+            rig.select(plan_lights)
+        except PsvideoError as fault:
+            raise PsvideoError(f"{path}: {fault}") from None
+        return rig
     return _in_front(read_light_list(path, plan_lights=plan_lights), path)
 
 

@@ -133,8 +133,8 @@ class Rig:
         lacking = [name for name in names if name not in by_name]
         if lacking:
             raise PsvideoError(
-                f"The rig has no light named {', '.join(map(repr, lacking))}, which the plan flashes; "
-                f"{nearest(lacking[0], by_name)} Give the lights the same names in the rig file and in the plan."
+                f"The rig has no light named {', '.join(map(repr, lacking))}, which the plan flashes or pictures are "
+                f"named after; {nearest(lacking[0], by_name)} Give the lights the same names there and in the rig file."
             )
         return tuple(by_name[name] for name in names)
 

@@ -11,7 +11,7 @@ from psvideo.errors import NoStrobeError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.timing_json import format_timing
-from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.following.history import timing_of
@@ -149,6 +149,7 @@ def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:
     """Return what writes a rig that was found live, and says what became of it."""
     if path is None:
         return lambda rig: "Lights found, and used from now on. With `rig_out` they are written, too."
+    check_ending(path, ".toml", name="rig_out")
     refuse_existing(path, force=force)
 
     def write(rig: Rig) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from psvideo.errors import UsageError
 from psvideo.formats.light_lists.light_list_writer import files_of, write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import refuse_existing
@@ -39,6 +40,8 @@ def convert(
     files = files_of(path)
     for file in files:
         refuse_existing(file, force=force)
+    if name and Path(rig).suffix == ".toml":
+        raise UsageError(f"`name`: {rig} names its lights itself. Leave it out, or change the names in that file.")
     found = read_rig(Path(rig), plan_lights=tuple(name))
     for sentence in write_rig(path, found):
         caller.warn(sentence)

@@ -60,6 +60,8 @@ def flat_field(
     """
     rig_path, flat_path = rig_out(out, force=force), None if flat is None else Path(flat)
     if flat_path is not None:
+        if flat_path.resolve() == rig_path.resolve():
+            raise UsageError(f"`out` and `flat` both name {flat_path}. Give each a file of its own.")
         refuse_existing(flat_path, force=force, mark=FLAT_SCHEMA)
     check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)

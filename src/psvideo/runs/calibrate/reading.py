@@ -6,21 +6,24 @@ from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets
 from psvideo.clip.transfer import check_transfer
 from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
-from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
+from psvideo.formats.whole_files import PICTURE_MARK, check_ending, refuse_existing
 from psvideo.runs.photographs.light_sets import Reading, sets_of
 from psvideo.runs.steps.caller import Caller
 
 
 def rig_out(out: Path | str, *, force: bool) -> Path:
-    """Return where the rig goes. Raises UsageError where something is there that may not be replaced."""
+    """Return where the rig goes. Raises UsageError where its name would not be read as a rig's, or something is there
+    that may not be replaced."""
+    check_ending(Path(out), ".toml", name="out")
     refuse_existing(Path(out), force=force, mark=SCHEMA)
     return Path(out)
 
 
 def picture_beside(out: Path, *, force: bool) -> Path:
-    """Return where the picture beside a rig goes. Raises UsageError where it may not be replaced."""
+    """Return where the picture beside a rig goes. Raises UsageError where it may not be replaced; one without a rig is
+    left of a calibration that failed, and is."""
     path = out.with_suffix(".png")
-    refuse_existing(path, force=force, mark=PICTURE_MARK)
+    refuse_existing(path, force=force or not out.exists(), mark=PICTURE_MARK)
     return path
 
 

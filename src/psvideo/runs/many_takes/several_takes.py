@@ -59,7 +59,11 @@ def names_of(parameter: str, clips: Sequence[Path]) -> list[str]:
     names = [take_name(clip) for clip in clips]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise UsageError(f"`{parameter}`: several are named {twice[0]!r}, and their results would lie in one place.")
+        alike = ", ".join(str(clip) for clip in clips if take_name(clip) == twice[0])
+        raise UsageError(
+            f"{alike}: several are named {twice[0]!r}, and their results would lie in one place. Name each clip once, "
+            "or rename its folder."
+        )
     return names
 
 
