@@ -2,6 +2,7 @@
 
 import mmap
 import pickle
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import (
     Depth,
+    Height,
     Shaping,
     View,
     begun,
@@ -475,6 +477,34 @@ def ball(col: float, seed: int) -> Surface:
     normals[~inside] = (0, 0, 1)
     normals += 0.015 * np.random.default_rng(seed).normal(size=normals.shape)
     return surface(normals / np.linalg.norm(normals, axis=2, keepdims=True), EVERYWHERE)
+
+
+MOST_BYTES_A_PIXEL = 20
+"""What putting a height into its place may take for each pixel beside OpenCV's labels: 13.0 to 15.5 were measured, the
+depth and the heights whose median is found. Planes of 64 bits side by side took 29.5 to 38.5."""
+
+
+@pytest.mark.parametrize("view", [View(), View(focal_px=(900.0, 900.0))])
+def test_a_height_is_put_into_its_place_without_planes_beside_it(view: View) -> None:
+    valid = np.ones((600, 800), np.bool_)
+    valid[:, 390:393] = False
+    nothing, share = np.zeros(valid.shape, np.bool_), np.zeros(valid.shape, np.float32)
+    height = Height(
+        height=np.random.default_rng(0).random(valid.shape),
+        valid=valid,
+        cut_east=nothing,
+        cut_south=nothing,
+        rightward=share,
+        downward=share,
+    )
+    first = depth_of_height(height, view)
+    assert first.parts == 2
+    for reference, plane in ((None, None), (first, None), (None, (0.1, 0.05, 1.0, 1.2))):
+        tracemalloc.start()
+        depth_of_height(height, view, reference=reference, plane=plane)
+        _, most_bytes = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert most_bytes <= MOST_BYTES_A_PIXEL * valid.size
 
 
 def test_what_moves_is_not_held_where_it_was() -> None:

@@ -22,6 +22,8 @@ WORKED_ON_PIXELS = 1 << 20
 """From this many pixels on, what is worked on in steps lies in files while a step needs it not."""
 BAND_ROWS = 64
 """Of what is worked on row by row, this many are in memory at a time."""
+APART_BYTES = 1 << 20
+"""What is smaller lies in the heap."""
 AROUND_BYTES = 1 << 20
 """This much before a part goes with it: where a page is read, the system hands over those around it too."""
 
@@ -57,6 +59,17 @@ def in_file(shape: tuple[int, ...], kind: DTypeLike, folder: Path) -> NDArray[An
     return np.frombuffer(held, kind).reshape(shape)
 
 
+def room_apart(shape: tuple[int, ...], kind: DTypeLike) -> NDArray[Any]:
+    """Return room, all 0, in memory that the system gets back with the array, and of which it gives what is touched.
+
+    In the heap, what comes for a while and goes again leaves holes behind, and the heap stays as large as it ever was.
+    """
+    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    if size < APART_BYTES:
+        return np.zeros(shape, kind)
+    return np.frombuffer(mmap.mmap(-1, size), kind).reshape(shape)
+
+
 def room_for(shape: tuple[int, ...], kind: DTypeLike, spare: Path | None) -> NDArray[Any]:
     """Return a plane of 0: where it is large and there is a folder, in a file there (see ``let_go``)."""
     if spare is None or np.prod(shape[:2]) < WORKED_ON_PIXELS:
@@ -66,14 +79,9 @@ def room_for(shape: tuple[int, ...], kind: DTypeLike, spare: Path | None) -> NDA
 
 def kept_in(plane: NDArray[Kind], spare: Path | None) -> NDArray[Kind]:
     """Return a plane, or, where it is large and there is a folder, a copy that lies in a file there."""
-    if spare is None or plane.shape[0] * plane.shape[1] < WORKED_ON_PIXELS:
+    if spare is None or plane.shape[0] * plane.shape[1] < WORKED_ON_PIXELS or lie_in_files(plane):
         return plane
     return _copied(plane, in_file(plane.shape, plane.dtype, spare))
-
-
-def taken_back(plane: NDArray[Kind]) -> NDArray[Kind]:
-    """Return a plane that lies in memory."""
-    return plane if _mapping_of(plane) is None else _copied(plane, np.empty_like(plane))
 
 
 def _copied(plane: NDArray[Kind], into: NDArray[Kind]) -> NDArray[Kind]:

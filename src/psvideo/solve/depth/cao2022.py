@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import kept_in, let_go
+from psvideo.compute.spilled import bands, kept_in, let_go, lie_in_files, room_for
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
 from psvideo.solve.depth.view import Box, Slopes, View, slopes_of
@@ -104,18 +104,21 @@ def integrate(
     if before is not None:
         before.let_go()
     planes = (height, *_cuts(slopes, rightward, downward), rightward, downward)
-    height, cut_east, cut_south, rightward, downward = (_whole(plane, valid.shape, box) for plane in planes)
+    height, cut_east, cut_south, rightward, downward = (_whole(plane, valid.shape, box, spare) for plane in planes)
     return Height(
         height=height, valid=valid, cut_east=cut_east, cut_south=cut_south, rightward=rightward, downward=downward
     )
 
 
-def _whole(plane: NDArray[Any], shape: tuple[int, ...], box: Box) -> NDArray[Any]:
-    """Put a plane into its place in the picture."""
+def _whole(plane: NDArray[Any], shape: tuple[int, ...], box: Box, spare: Path | None) -> NDArray[Any]:
+    """Put a plane into its place in the picture, in a file where it lies in one."""
     if plane.shape == shape:
         return plane
-    whole = np.zeros(shape, plane.dtype)
-    whole[box] = plane
+    whole = room_for(shape, plane.dtype, spare) if lie_in_files(plane) else np.zeros(shape, plane.dtype)
+    place = whole[box]
+    for first, last in bands(len(plane)):
+        place[first:last] = plane[first:last]
+        let_go(plane[first:last], whole[box[0]][first:last])
     return whole
 
 
@@ -145,12 +148,19 @@ def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) 
 
 def _cuts(slopes: Slopes, rightward: Floats, downward: Floats) -> tuple[Mask, Mask]:
     """Where hardly any weight is left between neighbours that are both valid."""
-    squared = slopes.facing**2
-    cut_east, cut_south = np.zeros(squared.shape, np.bool_), np.zeros(squared.shape, np.bool_)
-    one, other = squared[:, :-1], squared[:, 1:]
-    tie = rightward[:, :-1] * one + (1 - rightward[:, 1:]) * other
-    cut_east[:, :-1] = (one > 0) & (other > 0) & (tie < CUT_SHARE * (one + other))
-    one, other = squared[:-1], squared[1:]
-    tie = downward[:-1] * one + (1 - downward[1:]) * other
-    cut_south[:-1] = (one > 0) & (other > 0) & (tie < CUT_SHARE * (one + other))
+    shape = slopes.facing.shape
+    cut_east, cut_south = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+    for first, last in bands(shape[0]):
+        squared = slopes.facing[first : last + 1] ** 2  # of the row below the band too
+        one, share = squared[: last - first], rightward[first:last]
+        cut_east[first:last, :-1] = _cut(one[:, :-1], one[:, 1:], share[:, :-1], share[:, 1:])
+        share = downward[first : last + 1]
+        cut_south[first : first + len(squared) - 1] = _cut(squared[:-1], squared[1:], share[:-1], share[1:])
+        let_go(slopes.facing[first:last], rightward[first:last], downward[first:last])
     return cut_east, cut_south
+
+
+def _cut(one: Floats, other: Floats, share: Floats, next_share: Floats) -> Mask:
+    """Where neighbours, of which the squared facing and the shares are given, are cut apart."""
+    cut: Mask = (one > 0) & (other > 0) & (share * one + (1 - next_share) * other < CUT_SHARE * (one + other))
+    return cut

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import REORDERED
+from psvideo.compute.spilled import room_apart
 
 Board = NDArray[np.float32]
 """Of shape (2, row + 2, half a row + 2)."""
@@ -23,7 +24,7 @@ ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 
 def empty_board(rows: int, cols: int) -> Board:
     """Return a board of zeros for a grid of that size."""
-    return np.zeros((2, rows + 2, (cols + 1) // 2 + 2), np.float32)
+    return room_apart((2, rows + 2, (cols + 1) // 2 + 2), np.float32)
 
 
 @REORDERED.inlined

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import bands, kept_in, let_go, room_for, taken_back
+from psvideo.compute.heap import give_back
+from psvideo.compute.spilled import bands, kept_in, let_go, lie_in_files, room_for
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.checkerboard import Board, empty_board
 from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, set_up_levels, solve, weighed
@@ -87,12 +88,14 @@ def find_height(
 
     spare: a folder in whose files these and the ``slopes`` may lie, where they are large."""
     whole = bool((slopes.facing > 0).all())
-    work = _begun(slopes, poisson_height(slopes) if whole else None, spare)
+    let_go(slopes.facing)
+    height, rightward, downward = _room_at_first(slopes, poisson_height(slopes) if whole else None, spare)
+    if lie_in_files(height):
+        give_back()  # what the solver of normals left free lies beside the grids, and may be as large
+    work = _begun(slopes, height, rightward, downward)
     if not (whole and how.sharpness == 0.0):
         _find(work, how, held)
-    height, rightward, downward = work.height, work.rightward, work.downward
-    del work  # what comes back into memory finds room where the grids were
-    return taken_back(height), taken_back(rightward), taken_back(downward)
+    return work.height, work.rightward, work.downward
 
 
 def _find(work: _Work, how: Integration, held: TakenOver | None) -> None:
@@ -130,17 +133,25 @@ def _take_over(work: _Work, held: TakenOver) -> None:
     work.in_bands(take, held.rightward, held.downward)
 
 
-def _begun(slopes: Slopes, height: FloatArray | None, spare: Path | None) -> _Work:
-    """Begin at a height, else at 0, with equal shares."""
+def _room_at_first(slopes: Slopes, height: FloatArray | None, spare: Path | None) -> tuple[FloatArray, Floats, Floats]:
+    """Return the height to begin with, else 0, and equal shares."""
+    shape = slopes.facing.shape
+    rightward, downward = (room_for(shape, np.float32, spare) for _ in range(2))
+    for first, last in bands(shape[0]):
+        for share in (rightward, downward):
+            share[first:last] = 0.5
+            let_go(share[first:last])
+    return room_for(shape, np.float64, spare) if height is None else kept_in(height, spare), rightward, downward
+
+
+def _begun(slopes: Slopes, height: FloatArray, rightward: Floats, downward: Floats) -> _Work:
     rows, cols = slopes.facing.shape
     facing, across, down = (
         plane.astype(np.float32, copy=False) for plane in (slopes.facing, slopes.across, slopes.down)
     )
-    rightward, downward = (room_for((rows, cols), np.float32, spare) for _ in range(2))
-    rightward[:] = downward[:] = 0.5
     return _Work(
         given=(facing, across, down, np.float32(slopes.aspect)),
-        height=room_for((rows, cols), np.float64, spare) if height is None else kept_in(height, spare),
+        height=height,
         rightward=rightward,
         downward=downward,
         lines=np.zeros((2, cols), np.float32),

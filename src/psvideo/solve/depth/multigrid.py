@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import REORDERED
+from psvideo.compute.spilled import room_apart
 from psvideo.solve.depth.checkerboard import Board, ascend, descend, empty_board, invert, pull, settle
 from psvideo.solve.depth.torn_blocks import OWN, coarsen, coarsen_pins, mend, part, prolong_moved, restrict_moved
 
@@ -63,12 +64,12 @@ def empty_grids(shape: tuple[int, int]) -> Grids:
         board = empty_board(*shape)
         levels.append(
             Level(
-                ties=np.zeros((2, *board.shape), np.float32),
+                ties=room_apart((2, *board.shape), np.float32),
                 inverse=board,
-                right=np.zeros_like(board),
-                height=np.zeros_like(board),
-                belongs=np.zeros(board.shape, np.int8),
-                room=np.zeros((int(MOST_MOVED * board.size) + 4, 3), np.int32),
+                right=empty_board(*shape),
+                height=empty_board(*shape),
+                belongs=room_apart(board.shape, np.int8),
+                room=room_apart((int(MOST_MOVED * board.size) + 4, 3), np.int32),
                 pins=np.zeros((2, 1, 1), np.float32),
                 moved=np.zeros((0, 3), np.int32),
             )
@@ -87,7 +88,7 @@ def set_up_levels(grids: Grids, pins: Board | None = None) -> bool:
     grids.levels[0].pins = grids.levels[0].pins if pins is None else pins
     for finer, coarser in pairwise(grids.levels):
         if pinned:
-            coarser.pins = np.zeros_like(coarser.right)
+            coarser.pins = room_apart(coarser.right.shape, np.float32)
             coarsen_pins(finer.pins, coarser.pins)
         invert(finer.ties, finer.pins, pinned, finer.inverse)
         finer.belongs[:] = OWN

@@ -100,15 +100,16 @@ def begun(shaping: Shaping, surface: Surface) -> Shaping:
     height = integrate(surface.normals, surface.shown, shaping.view, how=shaping.how, spare=shaping.spare)
     first = _scaled(replace(shaping, first=None), height)
     before = Before(height=height, normals=surface.normals)
-    return replace(shaping, first=first, before=before.kept_in(shaping.spare))
+    return replace(shaping, first=first.kept_in(shaping.spare), before=before.kept_in(shaping.spare))
 
 
 def kept_beside(shaping: Shaping | None, spare: Path) -> Shaping | None:
     """Return a clip's shaping, of which large pictures lie in a folder's files from now on; None stays None."""
     if shaping is None:
         return None
+    first = None if shaping.first is None else shaping.first.kept_in(spare)
     before = None if shaping.before is None else shaping.before.kept_in(spare)
-    return replace(shaping, before=before, spare=spare)
+    return replace(shaping, first=first, before=before, spare=spare)
 
 
 def scale_note(shaping: Shaping) -> str:

@@ -6,6 +6,7 @@ for periodic; the cosine transform (T. Simchony et al. 1990) leaves its border f
 
 import numpy as np
 
+from psvideo.compute.spilled import BAND_ROWS, let_go
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.view import Slopes
 
@@ -46,6 +47,9 @@ def _divergence(slopes: Slopes) -> FloatArray:
             divergence[row - 1] += south
             divergence[row] -= south
         above = down
+        if row % BAND_ROWS == BAND_ROWS - 1 or row == rows - 1:
+            done = slice(row // BAND_ROWS * BAND_ROWS, row + 1)
+            let_go(slopes.facing[done], slopes.across[done], slopes.down[done])
     return divergence
 
 
