@@ -492,6 +492,10 @@ def test_the_command_says_what_it_assumed(tmp_path: Path, capsys: pytest.Capture
     assert "read as 'srgb'" in said.out + said.err
     assert "say --transfer linear" in said.err
     assert main(words) == 2
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<h2>Over time</h2>" not in page, "one picture has no course"
+    assert "The only result</summary>" in page
+    assert ".;" not in page[page.index("Remarks") :], "sentences are joined once"
 
 
 def test_info_says_what_a_folder_of_photographs_is_read_as_and_what_differs(tmp_path: Path) -> None:

@@ -32,13 +32,20 @@ def report_page(report: RunReport, pictures: Sequence[tuple[str, Pixels]]) -> st
         _section("What was shot", _table(report.shot)),
         _section("Timing", _timing(report)),
         _section("Lights and exposure", _lights(report)),
-        _section("Over time", over_time(report.instants, [light.name for light in report.lights])),
+        _over_time(report),
         _section("Worst results", _worst(report)),
         _section("To make this again", _table(report.settings)),
     ]
     return PAGE.format(
         title=html.escape(report.clip), style=STYLE, head=_head(report), body="".join(sections), version=report.version
     )
+
+
+def _over_time(report: RunReport) -> str:
+    """Return the charts of more than one instant; of one there is nothing over time."""
+    if len(report.instants) == 1:
+        return ""
+    return _section("Over time", over_time(report.instants, [light.name for light in report.lights]))
 
 
 def _head(report: RunReport) -> str:
@@ -118,7 +125,8 @@ def _worst(report: RunReport) -> str:
     grid = f'<div class="grid4">{tiles}</div>' if tiles else "<p>No result stands out as bad.</p>"
     ordered = sorted(report.instants, key=lambda one: (-badness(one)[0], one.number))[:MOST_ROUNDS]
     rows = "".join(_round_row(one) for one in ordered)
-    shown = f"The {len(ordered)} worst of {len(report.instants)} results" if ordered else "No results"
+    worst = "The only result" if len(ordered) == 1 else f"The {len(ordered)} worst of {len(report.instants)} results"
+    shown = worst if ordered else "No results"
     head = (
         "<tr><th>number</th><th>time, s</th><th>valid</th><th>saturated</th><th>rows unseen</th><th>ambient</th></tr>"
     )

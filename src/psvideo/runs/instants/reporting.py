@@ -130,6 +130,7 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
     )
     readout = "not known" if camera.readout_s is None else f"{camera.readout_s * 1e3:.4g} ms"
     shutter_deg = 360 * camera.exposure_s / camera.frame_period_s
+    remarks = dict.fromkeys((clip.curve_doubt, *clip.warnings, *clip.notes))
     return {
         "Clip": str(clip.path.resolve()),
         "Frames": f"{len(numbers)} of {len(clip.numbers)}, numbered {numbers[0]} to {numbers[-1]}",
@@ -146,7 +147,7 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         "Rounds a second": f"{len(plan.dark_rounds) / plan.cycle_s:.4g}"
         if plan.mode != "synced"
         else f"{float(camera.fps) / len(plan.flashes):.4g}",
-        "Remarks": "; ".join(filter(None, dict.fromkeys((clip.curve_doubt, *clip.warnings, *clip.notes)))) or "none",
+        "Remarks": "; ".join(one.rstrip(".") for one in remarks if one) or "none",
     }
 
 
