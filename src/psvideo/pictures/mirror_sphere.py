@@ -34,7 +34,7 @@ def sphere_picture(found: MirrorCalibration) -> Pixels:
 
 
 def faulty_picture(picture: NDArray[np.float32]) -> Pixels:
-    """Return the picture in which no sphere was found, brightened for eyes."""
+    """Return the picture (row, col), linear, in which no sphere was found, brightened for eyes, as (row, col, 3)."""
     strip = Strip("No usable sphere was found in this picture (brightest of all lights)", [Tile("", _shown(picture))])
     return sheet([strip], width_px=WIDTH_PX)
 

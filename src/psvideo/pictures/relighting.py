@@ -84,7 +84,7 @@ def relight(
 
 
 def smaller(image: NDArray[np.floating], width_px: int) -> Image:
-    """Return a picture at most this wide, averaged down, for showing it."""
+    """Return a picture (row, col[, channel]) averaged down to at most this width, for showing it."""
 
     def read(first: int, last: int) -> NDArray[np.floating]:
         let_go(image[:first])
@@ -126,7 +126,7 @@ def three_channels(image: Image) -> Image:
 
 
 def srgb(linear: Image, *, exposure: float = 1.0) -> Pixels:
-    """Return linear light as 8-bit sRGB pixels (IEC 61966-2-1); what is above 1 after ``exposure`` is white."""
+    """Return linear light (row, col[, 3]) as 8-bit sRGB pixels (row, col, 3), IEC 61966-2-1; above 1 is white."""
     pixels: Pixels = (255 * srgb_share(three_channels(linear) * np.float32(exposure)) + 0.5).astype(np.uint8)
     return pixels
 

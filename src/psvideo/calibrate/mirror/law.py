@@ -56,7 +56,7 @@ def mirrored_ray(
 
 
 def mean_direction(rays: Sequence[Ray]) -> tuple[FloatArray, float, float]:
-    """Return the mean direction of rays, its standard error in degrees, and the rays' scatter over their own errors.
+    """Return the mean direction (3,) of rays, its standard error in degrees, and their scatter over their own errors.
 
     Where rays scatter more than their errors say, the error grows by as much.
     """

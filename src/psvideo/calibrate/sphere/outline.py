@@ -113,7 +113,7 @@ def find_outlines(
 
 
 def follow_outline(pictures: LightPictures, outline: Outline) -> FloatArray:
-    """Return an outline's place in other pictures of the same scene; where too little of it shows, the place it had."""
+    """Return an outline's place (5,) in other pictures of the scene; where too little of it shows, the place it had."""
     place = follow_rim(rim_pictures(pictures), outline.view, outline.place)
     return outline.place if place is None else place
 

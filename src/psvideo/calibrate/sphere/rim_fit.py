@@ -72,7 +72,7 @@ class RoughOutline:
 def seek_rim(
     pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
 ) -> RoughOutline | None:
-    """Return roughly the outline near an expected one, from few spokes; None where none is near it."""
+    """Return roughly the outline near an expected one (5,), from few spokes; None where none is near it."""
     place = around
     for share, least_px in COARSE:
         most_px = float(np.ceil(max(share * place[2], least_px)))
@@ -89,7 +89,7 @@ def seek_rim(
 def fit_rim(
     pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
 ) -> Rim | None:
-    """Return the outline within a few pixels of an expected one; None where it is not there."""
+    """Return the outline within a few pixels of an expected one (5,); None where it is not there."""
     spokes = spokes_of(pictures, view, around, surface, _fine_px(around))
     place = _likeliest(spokes, view.unknowns)
     # in a single picture an edge of the room and the rim look alike: only other lights change the one and not the other
@@ -105,7 +105,7 @@ def fit_rim(
 
 
 def follow_rim(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
-    """Return where a mirror's outline, known from other pictures, is in these; None where too little of it shows."""
+    """Return where a mirror's outline (5,), known from other pictures, is in these; None where too little shows."""
     for mirrored in (False, True):
         spokes = spokes_of(pictures, view, around, "mirror", _fine_px(around), mirrored=mirrored)
         place = _likeliest(spokes, view.unknowns, coarse=False)

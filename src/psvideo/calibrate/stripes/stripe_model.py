@@ -71,14 +71,14 @@ def _places(rows: int) -> FloatArray:
 
 
 def start(frame: FloatArray, waves: FloatArray, smooth: FloatArray) -> Nuisance:
-    """Fit one frame's profiles with an envelope of 1."""
+    """Fit one frame's profiles (group, row) by ``waves_of`` and ``spline_basis`` of its rows, with an envelope of 1."""
     found = np.asarray(np.linalg.lstsq(np.hstack([smooth, waves]), frame.T, rcond=None)[0].T, np.float64)
     knots = smooth.shape[1]
     return Nuisance(found[:, :knots], np.ones((len(frame), knots)), found[:, knots:])
 
 
 def stripe_equations(frame: FloatArray, own: Nuisance, waves: FloatArray, smooth: FloatArray) -> Equations:
-    """Set up one frame's equations around the present state."""
+    """Set up the equations of one frame's profiles (group, row) around the present state."""
     shape, slope, change = _changes(own, waves, smooth)
     residual = frame - own.background @ smooth.T - shape
     weight = _weights(residual, shape)

@@ -63,7 +63,7 @@ def inverse_depth(plane: tuple[float, float, float, float], x: FloatArray, y: Fl
 
 
 def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.floating] | None = None) -> Ground:
-    """Return the ground for a picture of that size: on the rig's plane, and at the depth ``known_m`` where that is > 0.
+    """Return the ground of a picture: on the rig's plane, and at the depth ``known_m`` (row, col) where that is > 0.
 
     Without a plane, pixels of unknown depth take that of the nearest known one. Raises PsvideoError where the rig lacks
     the plane or the camera that near lights need, or where they make no sense.
@@ -87,7 +87,7 @@ def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.fl
 
 
 def spread(known_m: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Give pixels of unknown depth that of the nearest known pixel."""
+    """Return depth (row, col) of which pixels that are unknown (0 or less) have that of the nearest known pixel."""
     unknown = (known_m <= 0).astype(np.uint8)
     _, labels = cv2.distanceTransformWithLabels(unknown, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     depth_of_label = np.zeros(int(labels.max()) + 1, known_m.dtype)

@@ -40,7 +40,7 @@ def collect_with_doubt(
 
 
 def row_light(picture: Coded) -> tuple[FloatArray, FloatArray]:
-    """Return the mean light of every row of a picture in codes, and the share of its samples that are saturated."""
+    """Return the mean light of every row of a picture in codes, and the share of its samples that clip, (row,) each."""
     rows, tone = picture.shape[0], picture.tone
     mean, clipped = np.empty(rows), np.empty(rows)
     flat = np.ascontiguousarray(picture.codes).reshape(rows, -1)

@@ -42,7 +42,10 @@ def _share(table: AlbedoTable, points_m: FloatArray) -> FloatArray:
 
 
 def layered_noise(cells: FloatArray, octaves: int = 4) -> FloatArray:
-    """Return fractal value noise at points in units of its largest cells, about -1 to 1, the same on every machine."""
+    """Return fractal value noise (point,) at points (point, 3) in units of its largest cells, about -1 to 1.
+
+    It is the same on every machine.
+    """
     total = np.zeros(len(cells))
     for octave in range(octaves):
         total += 0.5**octave * _value_noise(cells * 2.0**octave + 17.3 * octave)

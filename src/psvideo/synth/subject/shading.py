@@ -71,7 +71,7 @@ def _shadowed(
 
 
 def lifted(view: SeenScene) -> FloatArray:
-    """Return the hits' points a little above their surface, where rays towards lights start."""
+    """Return the hits' points (hit, 3) a little above their surface, where rays towards lights start."""
     size_m = view.shadows.size_m if view.shadows is not None else 0.0
     return np.asarray(view.hits.point_m + LIFT * size_m * view.hits.facet)
 

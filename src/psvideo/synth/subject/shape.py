@@ -36,7 +36,10 @@ class Shape:
 
 
 def make_shape(vertices: FloatArray, faces: NDArray[np.integer], colours: FloatArray | None = None) -> Shape:
-    """Return a shape whose normals are the area-weighted means of the faces around each vertex."""
+    """Return a shape of vertices (vertex, 3), faces (face, 3) and colours (vertex, 3).
+
+    Its normals are the area-weighted means of the faces around each vertex.
+    """
     return Shape(
         vertices=np.asarray(vertices, np.float64),
         faces=np.asarray(faces, np.int32),
@@ -60,7 +63,7 @@ def merged(*shapes: Shape) -> Shape:
 
 
 def vertex_normals(vertices: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
-    """Return unit normals per vertex: the sum of the adjoining faces' normals, each weighted by its area."""
+    """Return unit normals (vertex, 3): the sum of the adjoining faces' normals, each weighted by its area."""
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     crosses = np.cross(b - a, c - a)
     corner, crosses = faces.ravel(), np.repeat(crosses, 3, axis=0)
@@ -127,5 +130,5 @@ def load_texture(path: Path) -> NDArray[np.float32]:
 
 
 def linear_from_srgb(codes: NDArray[Any]) -> NDArray[np.float32]:
-    """Return sRGB codes, the whole range of their type, as linear light."""
+    """Return the linear light, same shape, of sRGB codes that use the whole range of their integer type."""
     return np.asarray(CURVES["srgb"].decode(codes / np.iinfo(codes.dtype).max), np.float32)
