@@ -20,9 +20,12 @@ from psvideo.model.camera import FloatArray
 LIT, KEPT = 0.08, 0.8
 """A pixel counts that every light lights at least this much of its brightest one; of these the share that fits best."""
 LEAST_PIXELS, MOST_PIXELS = 300, 20_000
-BLOCKS = 4
+"""Of so few pixels nothing is measured, and so many are enough."""
+BLOCKS, FEWEST_OF_A_BLOCK = 4, 20
+"""The jackknife leaves out one of this many times this many blocks of the picture, of which so many pixels counted."""
 ROUNDS = 4
 MOST_DOUBT = 0.2
+"""A scene whose parts differ by more (relative standard error) does not show the lights' strengths."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,14 +75,7 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
     across = np.eye(lights) - directions @ np.linalg.pinv(directions)
     grey = values.mean(axis=2)
     whole, kept, left = _fitted(grey, across)
-    used = [one for one in np.unique(block) if (block[kept] == one).sum() >= 20]
-    parts = np.array(
-        [_fitted(grey[:, block != one], across)[0] for one in used if (block != one).sum() >= LEAST_PIXELS]
-    )
-    count = len(parts)
-    error = (
-        np.sqrt((count - 1) / count * ((parts / whole - 1) ** 2).sum(axis=0)) if count > 1 else np.full(lights, np.inf)
-    )
+    error = _error_by_parts(grey, block, kept, across, whole)
     if not np.isfinite(error).all() or error.max() > MOST_DOUBT:
         raise PsvideoError(
             "This scene does not show how strong the lights are (parts of it differ by more than "
@@ -88,6 +84,22 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
         )
     channels = [_fitted(values[:, kept, channel], across)[0] for channel in range(values.shape[2])]
     return Strengths(intensity=np.stack(channels, axis=1), error=error, left=left)
+
+
+def _error_by_parts(
+    grey: FloatArray, block: NDArray[np.intp], kept: NDArray[np.bool_], across: FloatArray, whole: FloatArray
+) -> FloatArray:
+    """Return the relative standard error (light,) of intensities ``whole``, by a jackknife over the picture's blocks;
+    infinite where there are fewer than two."""
+    used = [one for one in np.unique(block) if (block[kept] == one).sum() >= FEWEST_OF_A_BLOCK]
+    parts = np.array(
+        [_fitted(grey[:, block != one], across)[0] for one in used if (block != one).sum() >= LEAST_PIXELS]
+    )
+    count = len(parts)
+    if count < 2:
+        return np.full(len(whole), np.inf)
+    error: FloatArray = np.sqrt((count - 1) / count * ((parts / whole - 1) ** 2).sum(axis=0))
+    return error
 
 
 def _fitted(values: FloatArray, across: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], float]:

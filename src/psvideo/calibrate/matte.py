@@ -27,8 +27,9 @@ LEAST_COSINE, STEEPER_COSINE = 0.1, 0.4
 goes into the error: no paint is quite matte."""
 TUKEY_WIDTH = 4.685
 ROUNDS = 12
-PATCHES = 4
-"""The jackknife leaves out one of this many times this many patches of the outline's square."""
+PATCHES, FEWEST_OF_A_PATCH = 4, 10
+"""The jackknife leaves out one of this many times this many patches of the outline's square, of which so many pixels
+counted."""
 LEAST_PIXELS = 200
 MOST_PIXELS = 40_000
 MOST_LEFT = 0.1
@@ -158,13 +159,7 @@ def _light(name: str, n: int, sphere: _Sphere, moved: list[_Sphere]) -> MatteLig
             name=name, direction=direction, error_deg=180.0, intensity=intensity, intensity_error=1.0, left=left,
             used=used, fault=fault,
         )  # fmt: skip
-    patches = [patch for patch in np.unique(sphere.patch) if (lit & (sphere.patch == patch)).sum() >= 10]
-    without = [_fitted(sphere, n, sphere.patch != patch)[0].sum(axis=0) for patch in patches]
-    off = [_fitted(sphere, n, everything, least_cosine=STEEPER_COSINE)[0].sum(axis=0)]
-    off += [_fitted(one, n, np.ones(len(one.normals), np.bool_))[0].sum(axis=0) for one in moved]
-    count = max(len(patches), 1)
-    spread = np.array([one - total for one in without])
-    covariance = (count - 1) / count * spread.T @ spread + sum(np.outer(one - total, one - total) for one in off)
+    covariance = _covariance(sphere, n, moved, lit, total)
     length = float(np.linalg.norm(total))
     across = np.eye(3) - np.outer(direction, direction)
     error_deg = float(np.degrees(np.sqrt(np.trace(across @ covariance @ across)) / length))
@@ -178,6 +173,21 @@ def _light(name: str, n: int, sphere: _Sphere, moved: list[_Sphere]) -> MatteLig
         used=used,
         fault=_CONTRADICTS if error_deg > MOST_ERROR_DEG else "",
     )
+
+
+def _covariance(sphere: _Sphere, n: int, moved: list[_Sphere], lit: NDArray[np.bool_], total: FloatArray) -> FloatArray:
+    """Return the covariance (3, 3) of a light's direction times its intensity, ``total``: how it changes as patches are
+    left out one by one, as only what is well lit counts, and as the outline is moved by its own error."""
+    everything = np.ones(len(sphere.normals), np.bool_)
+    patches = [patch for patch in np.unique(sphere.patch) if (lit & (sphere.patch == patch)).sum() >= FEWEST_OF_A_PATCH]
+    without = [_fitted(sphere, n, sphere.patch != patch)[0].sum(axis=0) for patch in patches]
+    off = [_fitted(sphere, n, everything, least_cosine=STEEPER_COSINE)[0].sum(axis=0)]
+    off += [_fitted(one, n, np.ones(len(one.normals), np.bool_))[0].sum(axis=0) for one in moved]
+    count = max(len(patches), 1)
+    spread = np.array([one - total for one in without])
+    covariance: FloatArray
+    covariance = (count - 1) / count * spread.T @ spread + sum(np.outer(one - total, one - total) for one in off)
+    return covariance
 
 
 _CONTRADICTS = "its parts contradict each other: what is inside the outline is no matte sphere of one colour"

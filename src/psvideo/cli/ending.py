@@ -45,50 +45,57 @@ def stoppable() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    asked, is_dropping = False, False
-    later: list[threading.Timer] = []
-    say_dropped = sys.unraisablehook
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        nonlocal asked
-        if is_dropping:
-            stop_later(number)
-            return
-        if asked:
-            os._exit(PsvideoError.exit_status)
-        asked = True
-        raise KeyboardInterrupt(number)
-
-    def stop_later(number: int) -> None:
-        later.append(threading.Timer(LATER_S, signal.raise_signal, (number,)))
-        later[-1].start()
-
-    def dropped(what: "sys.UnraisableHookArgs") -> None:
-        nonlocal asked, is_dropping
-        if not (isinstance(what.exc_value, KeyboardInterrupt) and what.exc_value.args):
-            say_dropped(what)
-            return
-        asked, is_dropping = False, True
-        stop_later(*what.exc_value.args)
-        is_dropping = False
-
-    sys.unraisablehook = dropped
+    heard = _Heard()
     before = {number: signal.getsignal(number) for number in ENDING}
-    heard = [number for number, handler in before.items() if handler not in (signal.SIG_IGN, None)]
-    for number in heard:
-        signal.signal(number, stop)
+    obeyed = [number for number, handler in before.items() if handler not in (signal.SIG_IGN, None)]
+    sys.unraisablehook = heard.dropped
+    for number in obeyed:
+        signal.signal(number, heard.stop)
     try:
         yield
     except Exception as fault:
-        if later and not asked:
+        if heard.later and not heard.asked:
             raise KeyboardInterrupt from fault
         raise
     finally:
-        for timer in later:
+        for timer in heard.later:
             timer.cancel()
-        for number in heard:
+        for number in obeyed:
             signal.signal(number, before[number])
-        sys.unraisablehook = say_dropped
+        sys.unraisablehook = heard.say_dropped
+
+
+class _Heard:
+    """The stops that were heard: ``asked`` for once already, and those that Python dropped, to be raised ``later``."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self.is_dropping = False
+        self.later: list[threading.Timer] = []
+        self.say_dropped = sys.unraisablehook
+
+    def stop(self, number: int, frame: FrameType | None) -> None:
+        """Stop the command on its first signal, end the process on its second."""
+        if self.is_dropping:
+            self._stop_later(number)
+            return
+        if self.asked:
+            os._exit(PsvideoError.exit_status)
+        self.asked = True
+        raise KeyboardInterrupt(number)
+
+    def dropped(self, what: "sys.UnraisableHookArgs") -> None:
+        """Ask again for a stop that Python dropped; say what else it dropped as it would have."""
+        if not (isinstance(what.exc_value, KeyboardInterrupt) and what.exc_value.args):
+            self.say_dropped(what)
+            return
+        self.asked, self.is_dropping = False, True
+        self._stop_later(*what.exc_value.args)
+        self.is_dropping = False
+
+    def _stop_later(self, number: int) -> None:
+        self.later.append(threading.Timer(LATER_S, signal.raise_signal, (number,)))
+        self.later[-1].start()
 
 
 class _Starved(logging.Handler):

@@ -100,7 +100,7 @@ def _refuse_footage(out: Path, *, force: bool) -> None:
     if out.exists() and not (out / "truth" / "scene.json").is_file():
         raise UsageError(
             f"{out}: exists and was not written by psvideo synth (it holds no truth/scene.json), so `force` does not "
-            "replace it. Name another folder with -o, or remove this one yourself."
+            "replace it. Name another folder as `out`, or remove this one yourself."
         )
 
 

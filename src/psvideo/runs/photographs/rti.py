@@ -52,7 +52,11 @@ def write_rti(folder: Path, one: Round, rig: Rig) -> None:
         for plate, of in zip(one.plates, strengths, strict=True)
     )
     base, terms = _fitted(rows, lamps, strengths / exposure, step)
-    target = folder / FOLDER
+    _write_map(folder / FOLDER, base, terms, lamps)
+
+
+def _write_map(target: Path, base: Pixels, terms: NDArray[np.float16], lamps: FloatArray) -> None:
+    """Write planes, info.json and the .ptm of a colour (row, col, 3) and polynomials (row, col, 6)."""
     target.mkdir(parents=True, exist_ok=True)
     scale, bias = [1.0] * RED_GREEN_BLUE, [0.0] * RED_GREEN_BLUE
     _write_plane(target / "plane_0.jpg", base)
