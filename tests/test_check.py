@@ -162,7 +162,7 @@ def test_what_cannot_be_checked_is_one_plain_paragraph(
 def test_a_movie_is_not_decoded_to_its_end(
     shot: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from psvideo.clip.decode.movies import movie, movie_codes
+    from psvideo.clip.decode.movies import movie_codes, movie_frames
 
     clip = shot("good")
     frames = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]
@@ -170,7 +170,7 @@ def test_a_movie_is_not_decoded_to_its_end(
     shutil.copy(clip / "plan.toml", tmp_path / "plan.toml")
     decoded: list[int] = []
     picture = movie_codes.rgb_codes
-    monkeypatch.setattr(movie, "rgb_codes", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(movie_frames, "rgb_codes", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
     run("check", tmp_path / "take.mkv", "-q")
     assert 20 < len(decoded) < 60
 
