@@ -92,6 +92,69 @@ def test_a_matte_subject_is_solved_as_before_to_the_byte(monkeypatch: pytest.Mon
     assert found.albedo.tobytes() == before.albedo.tobytes()
 
 
+def clay(normals: Array, ways: Array, *, roughness: Array | float) -> list[NDArray[np.float32]]:
+    """Plates of brown clay by the angles of Oren and Nayar (1994), without the light from facet to facet."""
+    rng, up = np.random.default_rng(2), np.array([0.0, 0.0, 1.0])
+    square = np.asarray(roughness) ** 2
+    flat, back = 1 - 0.5 * square / (square + 0.33), 0.45 * square / (square + 0.09)
+    seen_at = np.arccos(np.clip(normals[..., 2], -1, 1))
+    plates = []
+    for way in ways:
+        cosine = normals @ way
+        lit_at = np.arccos(np.clip(cosine, -1, 1))
+        along, over = (each - normals * (normals @ each)[..., None] for each in (way, up))
+        sizes = np.linalg.norm(along, axis=-1) * np.linalg.norm(over, axis=-1)
+        between = (along * over).sum(axis=-1) / np.maximum(sizes, 1e-12)
+        more = np.maximum(between, 0) * np.sin(np.maximum(lit_at, seen_at)) * np.tan(np.minimum(lit_at, seen_at))
+        light = np.where(cosine > 0, cosine * (flat + back * more), 0)
+        plates.append(light[..., None] * np.array([0.55, 0.45, 0.35]))
+    return [(plate + rng.normal(0, 0.001, plate.shape)).astype(np.float32) for plate in plates]
+
+
+def under(ways: Array) -> Illumination:
+    return Illumination(directions=ways, intensities=np.ones((len(ways), 3)))
+
+
+@pytest.mark.parametrize(
+    ("ways", "most_deg"), [(WAYS, 1.2), (np.concatenate([ring(4, 50), ring(1, 5)]), 1.4)], ids=["12 lights", "5 lights"]
+)
+def test_clay_turns_no_normal(monkeypatch: pytest.MonkeyPatch, ways: Array, most_deg: float) -> None:
+    normals = waves()
+    plates = clay(normals, ways, roughness=0.6)
+    off = off_deg(Solving().solve(plates, under(ways)).normals, normals)
+    without_model(monkeypatch)
+    before = off_deg(Solving().solve(plates, under(ways)).normals, normals)
+    assert off.mean() < 0.5 * before.mean()
+    assert off.mean() < most_deg
+
+
+def test_what_is_matte_beside_clay_stays_matte(monkeypatch: pytest.MonkeyPatch) -> None:
+    normals, rough = waves(), np.arange(SIZE) < 0.75 * SIZE
+    plates = clay(normals, WAYS, roughness=np.where(rough, 0.6, np.zeros((SIZE, SIZE))))
+    off = off_deg(Solving().solve(plates, under(WAYS)).normals, normals)
+    without_model(monkeypatch)
+    before = off_deg(Solving().solve(plates, under(WAYS)).normals, normals)
+    assert off[:, rough].mean() < 0.8 * before[:, rough].mean()
+    assert off[:, ~rough].mean() <= 1.05 * before[:, ~rough].mean()
+
+
+def test_what_is_dark_under_grazing_light_is_not_taken_for_clay() -> None:
+    """A black level that was not taken off looks like roughness and a curve at once, and is neither."""
+    normals = waves()
+    plates = [plate - np.float32(0.04) for plate in clay(normals, WAYS, roughness=0.0)]
+    found = seen_in(plates, under(WAYS))
+    assert found is None or found.rough == 0
+
+
+def test_lights_that_are_off_are_not_taken_for_clay() -> None:
+    normals, rng = waves(), np.random.default_rng(8)
+    for _ in range(5):
+        wrong = WAYS + np.radians(3) * rng.normal(size=WAYS.shape) / np.sqrt(2)
+        wrong /= np.linalg.norm(wrong, axis=1, keepdims=True)
+        found = seen_in(clay(normals, WAYS, roughness=0.0), under(wrong))
+        assert found is None or found.rough == 0
+
+
 def test_near_lights_show_the_same_sheen() -> None:
     focal, middle, depth = 2.0 * SIZE, (SIZE - 1) / 2, 1.0
     ground = Ground(

@@ -120,6 +120,7 @@ class Weights(NamedTuple):
     read: np.float32  # the noise variance of a dark measurement, and per unit of light; 0 where noise is not known
     photon: np.float32
     curve: np.float32  # what the subject reflects beyond n . l: the numbers of reflectance.Reflectance, in g's unit
+    rough: np.float32
     broad: np.float32
     middle: np.float32
     narrow: np.float32

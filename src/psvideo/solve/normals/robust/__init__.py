@@ -9,6 +9,6 @@ A block of pixels goes through ``robust_kernel``:
 4. ``odd_of_four``: which of four measurements that contradict each other is left out
 5. ``predicted_error``: each normal's standard error
 
-Where a subject is not matte, ``reflectance`` finds from all its pixels how it reflects light, and ``reflecting`` solves
-its pixels again with that.
+Where a subject is not matte, ``reflectance`` takes points of it, ``reflectance_fit`` fits to them how it reflects
+light, and ``reflecting`` solves its pixels again with that.
 """

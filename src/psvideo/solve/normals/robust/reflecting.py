@@ -20,6 +20,7 @@ FROM_MEASUREMENTS = np.float32(5)  # of four any model explains too much
 CLEARLY = np.float32(0.2)  # where a pixel's residuals come down by so much, in sum, the model holds; by less, in part
 FAR_OFF = np.float32(1.5)  # the residual, over the pixel's own without the model, that counts half
 TWO, TO_BROAD, TO_MIDDLE, TO_NARROW = np.float32(2), np.float32(BROAD), np.float32(MIDDLE), np.float32(NARROW)
+LEAST_FACING = np.float32(0.05)  # of the cosines that roughness is divided by
 LEAST_BRIGHT = np.float32(0.55)  # of what is less, high powers are nothing, and numbers too small to be quick
 _MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
 _UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN, _SHINE = (BLOCK * k for k in range(10, 16))
@@ -72,9 +73,10 @@ def reflect(
     _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
     fill_residuals(gradient, w, matte, e, n)
     _add_up(kept, _AFTER, e, n)
+    unseen = ONE if weights.rough > ZERO else ZERO
     for i in range(n):
         gained = (kept[_BEFORE + i] - kept[_AFTER + i]) / (CLEARLY * max(kept[_BEFORE + i], TINY))
-        holds = min(max(gained, ZERO), ONE) if w[COUNT + i] >= FROM_MEASUREMENTS else ZERO
+        holds = min(max(gained, ZERO), ONE) if w[COUNT + i] >= FROM_MEASUREMENTS else unseen
         kept[HOLDS + i] = holds
         w[X + i] = kept[_MATTE_X + i] + holds * (w[X + i] - kept[_MATTE_X + i])
         w[Y + i] = kept[_MATTE_Y + i] + holds * (w[Y + i] - kept[_MATTE_Y + i])
@@ -138,6 +140,27 @@ def _shine(weights: Weights, cosine: np.float32) -> tuple[np.float32, np.float32
     return much, more
 
 
+@FUSED.inlined
+def _rough_share(cosine: np.float32, facing: np.float32, towards: np.float32) -> np.float32:
+    """What rough surfaces add, over the cosine to a light; ``facing`` and ``towards`` are the normal's and the light's
+    cosines to the camera."""
+    seen = max(facing, LEAST_FACING)
+    beyond = max(towards - cosine * seen, ZERO) if cosine > ZERO else ZERO
+    return np.float32(beyond / max(cosine, seen))
+
+
+@FUSED.inlined
+def _rough(cosine: np.float32, facing: np.float32, towards: np.float32) -> tuple[np.float32, np.float32, np.float32]:
+    """What rough surfaces add, and what it gains with the cosines to the light and to the camera."""
+    share = _rough_share(cosine, facing, towards)
+    back = ONE if share > ZERO else ZERO
+    seen = max(facing, LEAST_FACING)
+    over = cosine > seen
+    by_cosine = -seen if over else towards / seen - TWO * cosine
+    by_facing = -cosine if over else -cosine * towards / (seen * seen)
+    return share * cosine, back * by_cosine, back * by_facing
+
+
 @FUSED.called
 def _fill_gradient(
     ways: Floats, lights: int, weights: Weights, kept: Floats, matte: Floats, w: Floats, m: Floats, n: int
@@ -162,12 +185,16 @@ def _fill_gradient(
             holds = kept[HOLDS + i] if cosine > ZERO else ZERO
             much, more = _shine(weights, half)
             curve, by_half = weights.curve * holds, more * holds * per_size
-            by_cosine = ONE + TWO * curve * cosine
-            along = cosine + curve * cosine * cosine - by_cosine * cosine - by_half * half
+            added, rough_by_cosine, by_z = _rough(cosine, c, dz)
+            rough = weights.rough * holds
+            by_cosine = ONE + TWO * curve * cosine + rough * rough_by_cosine
+            by_z *= rough
+            along = cosine + curve * cosine * cosine + rough * added
+            along -= by_cosine * cosine + by_half * half + by_z * c
             by_half *= to_half
             line[i] = strength * (along * a + (by_cosine + by_half) * dx)
             line[BLOCK + i] = strength * (along * b + (by_cosine + by_half) * dy)
-            line[2 * BLOCK + i] = strength * (along * c + (by_cosine + by_half) * dz + by_half)
+            line[2 * BLOCK + i] = strength * (along * c + (by_cosine + by_half) * dz + by_half + by_z)
             line[3 * BLOCK + i] = strength * holds * much
         there, without = m[light], matte[light]
         for i in range(n):
@@ -190,7 +217,8 @@ def _take_off(ways: Floats, lights: int, weights: Weights, kept: Floats, values:
             holds = kept[HOLDS + i] if cosine > ZERO else ZERO
             much, _ = _shine(weights, half)
             kept[_SHINE + i] = holds * much * way[4, i]
-            kept[_GAIN + i] = ONE / (ONE + holds * weights.curve * cosine)
+            share = _rough_share(cosine, c, way[2, i])
+            kept[_GAIN + i] = ONE / (ONE + holds * (weights.curve * cosine + weights.rough * share))
         for channel in range(channels):
             plane = values[light * channels + channel]
             for i in range(n):

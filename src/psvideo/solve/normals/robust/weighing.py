@@ -56,7 +56,7 @@ def weights(
 ) -> Weights:  # fmt: skip
     """Return what the compiled loops take: ``noise`` is that of a dark measurement and per unit of light (variances),
     ``unit`` turns the model's highlights into the plates' unit of albedo."""
-    curve, *shine = (0.0,) * 4 if model is None else model
+    curve, rough, *shine = (0.0,) * 5 if model is None else model
     tukey = reweighting.loss == "tukey"
     return Weights(
         rounds=reweighting.rounds,
@@ -72,6 +72,7 @@ def weights(
         read=np.float32(noise[0]),
         photon=np.float32(noise[1]),
         curve=np.float32(curve),
+        rough=np.float32(rough),
         broad=np.float32(shine[0] * unit),
         middle=np.float32(shine[1] * unit),
         narrow=np.float32(shine[2] * unit),
