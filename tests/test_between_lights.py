@@ -2,11 +2,16 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
+from psvideo.plates.align.velocity import moving
 from psvideo.plates.align.velocity.between_lights import BetweenLights
+from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.moving import Pair, followed_at
 
@@ -67,3 +72,31 @@ def test_lights_agree_along_the_true_way_whatever_their_shading(goes_px: float) 
     assert true < 0.1
     for beside_px in (-2 * SQUARE_PX, 2 * SQUARE_PX):
         assert disagree(goes_px + beside_px) > true + 0.5
+
+
+@pytest.mark.parametrize(("px", "far"), [(9, False), (70, True)])
+def test_what_leaves_the_picture_is_not_looked_for_far_away(
+    px: int, far: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A camera that turns brings new things in at one side, which no plate before shows: that is no puzzle."""
+    rng, asked = np.random.default_rng(3), list[tuple[Any, ...]]()
+    wide = np.clip(120 + 60 * cv2.GaussianBlur(rng.normal(0, 6, (SHAPE[0], SHAPE[1] + 200)), (0, 0), 3), 0, 255)
+
+    def panned(light: int, time_s: float) -> Sketch:
+        left = round(px * (time_s + 1.5 * ROUND_S) / ROUND_S)
+        codes = np.asarray(wide[:, left : left + SHAPE[1]] * (0.7 + 0.1 * light), np.uint8)
+        return replace(sketch(light, time_s, 0.0), codes=codes)
+
+    shown = [
+        Pair(before=panned(light, one), after=panned(light, one + ROUND_S))
+        for light, one in enumerate(FLASHES_S - ROUND_S * (FLASHES_S > 0))
+    ]
+
+    def asking(*given: Any) -> list[tuple[float, float]]:
+        asked.append(given)
+        return displacements(*given)
+
+    monkeypatch.setattr(moving, "displacements", asking)
+    found = followed_at(shown, 0.0)
+    assert bool(asked) == far
+    assert np.abs(found.velocity[0][24:-24, 64:-64] + px / ROUND_S).mean() < 1.5

@@ -116,7 +116,8 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     velocity = none.copy()
     for proposed in lights.proposed():
         _take_better(lights, proposed, velocity, best)
-    if np.mean(np.minimum(best, wide_rest) > PUZZLING * lights.count) > PUZZLED:
+    puzzling = np.minimum(best, wide_rest) > PUZZLING * lights.count
+    if np.mean(puzzling & lights.stays(velocity)) > PUZZLED:
         for proposed in lights.proposed_far():
             _take_better(lights, proposed, velocity, best)
     fine_rest = lights.mean(rest, FINE_PX)
@@ -240,6 +241,15 @@ class _Lights:
 
         over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
         return out
+
+    def stays(self, velocity: Vectors) -> Flags:
+        """Return what is within the picture at both ends of its way: the rest is hidden in one plate of every light."""
+        before_s, after_s = (np.float32(span_s) for span_s in self.spans_s.mean(axis=0))
+        within = np.ones(self.shape, np.bool_)
+        for places, own, size in zip(pixel_places(*self.shape), velocity, self.shape[::-1], strict=True):
+            for ends in (places - before_s * own, places + after_s * own):
+                within &= (ends >= 0) & (ends <= size - 1)
+        return within
 
     def still(self) -> NDArray[np.intp]:
         """Return under how many lights a pixel shows the same at rest, shape (row, col)."""
