@@ -96,6 +96,17 @@ def test_two_lights_and_the_albedo_around_give_the_normal_and_one_light_nearly(
         assert (apart[where] <= 2 * surface.error_deg[where]).mean() > 0.75
 
 
+def test_a_picture_higher_than_wide_is_filled_as_a_square_one() -> None:
+    normals, _ = ball()
+    plates = plates_of(normals, np.array([0.5, 0.4, 0.3]), noise=0.0)
+    square, high = (Solving().solve([plate[:, void:].copy() for plate in plates], lit_by()) for void in (0, 8))
+    assert square.source is not None
+    assert high.source is not None
+    assert (high.source == TWO_LIGHTS).sum() > 300
+    np.testing.assert_array_equal(high.source, square.source[:, 8:])
+    np.testing.assert_allclose(high.normals, square.normals[:, 8:], atol=1e-3)
+
+
 def test_colours_that_meet_keep_their_own_albedo() -> None:
     normals, _ = ball()
     left = np.arange(SIZE)[None, :] < SIZE // 2
