@@ -496,6 +496,7 @@ def test_the_command_says_what_it_assumed(tmp_path: Path, capsys: pytest.Capture
     assert "<h2>Over time</h2>" not in page, "one picture has no course"
     assert "The only result</summary>" in page
     assert ".;" not in page[page.index("Remarks") :], "sentences are joined once"
+    assert not any(words in page for words in ("a second", "shutter", "Lasts", "<h2>Timing</h2>", "Strobe"))
 
 
 def test_info_says_what_a_folder_of_photographs_is_read_as_and_what_differs(tmp_path: Path) -> None:

@@ -117,8 +117,9 @@ class Clip:
     frames were dropped. ``cfa`` is the filter pattern at the picture's top left, None where it is not mosaiced.
     ``colour`` is the colour interop id of plates and albedo made from this clip; ``encoding`` is how its codes are
     read; a movie has the frames' ``timestamps``. Where a movie's rate varies, numbers count ``places_per_frame`` places
-    for every frame of the plan's rate, and ``plan`` has the rate of places. ``curve_doubt`` says why pictures
-    were likely coded by another curve; ``warnings`` say what may cost accuracy or was guessed, ``notes`` what else was
+    for every frame of the plan's rate, and ``plan`` has the rate of places. ``stills`` are photographs that were taken
+    one by one, at no rate. ``curve_doubt`` says why pictures were likely coded by another curve; ``warnings`` say what
+    may cost accuracy or was guessed, ``notes`` what else was
     found on opening.
     """
 
@@ -134,6 +135,7 @@ class Clip:
     encoding: Encoding
     timestamps: tuple[int, ...] = ()
     places_per_frame: int = 1
+    stills: bool = False
     curve_doubt: str = ""
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -68,6 +68,7 @@ class Photographs:
             header=head,
             colour=head.colour or find_curve(self.transfer).colour,
             encoding=self.encoding,
+            stills=True,
             warnings=head.warnings,
             notes=notes,
         )

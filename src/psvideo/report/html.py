@@ -30,7 +30,7 @@ def report_page(report: RunReport, pictures: Sequence[tuple[str, Pixels]]) -> st
         _section("Line by line", judgement_lines(report.judgements)),
         "".join(_figure(caption, picture) for caption, picture in pictures),
         _section("What was shot", _table(report.shot)),
-        _section("Timing", _timing(report)),
+        _section("Timing", _timing(report)) if "Strobe" in report.shot else "",  # photographs have none
         _section("Lights and exposure", _lights(report)),
         _over_time(report),
         _section("Worst results", _worst(report)),

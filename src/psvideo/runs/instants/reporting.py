@@ -122,14 +122,12 @@ def _where(light: Light | None) -> str:
 
 
 def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
-    plan, camera = clip.plan, clip.plan.camera
+    plan = clip.plan
     synced = plan.mode == "synced"
     flashes = " · ".join(
         (" + ".join(flash.lit) or "dark") + ("" if synced else f" {flash.duration_s * 1e3:.4g} ms")
         for flash in plan.flashes
     )
-    readout = "not known" if camera.readout_s is None else f"{camera.readout_s * 1e3:.4g} ms"
-    shutter_deg = 360 * camera.exposure_s / camera.frame_period_s
     remarks = dict.fromkeys((clip.curve_doubt, *clip.warnings, *clip.notes))
     return {
         "Clip": str(clip.path.resolve()),
@@ -137,6 +135,23 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         "Pictures": f"{clip.width_px} x {clip.height_px} pixels, {clip.kind}, "
         + (f"{clip.header.bits} bits" if clip.header.bits else "floating point")
         + (f", mosaic {clip.cfa}" if clip.cfa else ""),
+        **(_taken_one_by_one(clip, flashes) if clip.stills else _filmed(clip, numbers, flashes)),
+        "Remarks": "; ".join(one.rstrip(".") for one in remarks if one) or "none",
+    }
+
+
+def _taken_one_by_one(clip: Clip, lights: str) -> dict[str, str]:
+    """Return what is known of photographs, which no plan timed."""
+    return {"Camera": f"{clip.plan.camera.name}, transfer {clip.encoding.transfer}", "Lights": lights}
+
+
+def _filmed(clip: Clip, numbers: Sequence[int], flashes: str) -> dict[str, str]:
+    """Return rate, shutter and strobe of footage, in the plan's words."""
+    plan, camera = clip.plan, clip.plan.camera
+    synced = plan.mode == "synced"
+    readout = "not known" if camera.readout_s is None else f"{camera.readout_s * 1e3:.4g} ms"
+    shutter_deg = 360 * camera.exposure_s / camera.frame_period_s
+    return {
         "Camera": f"{float(camera.fps):.6g} frames a second, shutter {shutter_deg:.4g} degrees, readout {readout}, "
         f"transfer {clip.encoding.transfer}",
         "Lasts": f"{(numbers[-1] - numbers[0] + 1) * camera.frame_period_s:.3f} s"
@@ -147,7 +162,6 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         "Rounds a second": f"{len(plan.dark_rounds) / plan.cycle_s:.4g}"
         if plan.mode != "synced"
         else f"{float(camera.fps) / len(plan.flashes):.4g}",
-        "Remarks": "; ".join(one.rstrip(".") for one in remarks if one) or "none",
     }
 
 
