@@ -1,5 +1,6 @@
 """What a whole subject reflects beyond n . l is found from all of it, and used where a pixel is explained better."""
 
+import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from psvideo.model.surface import Reflectance, Surface
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import reflectance_of
+from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.robust.reflectance_fit import _rough as rough_in_the_fit
+from psvideo.solve.normals.robust.reflecting import _rough as rough_in_loops
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
 
@@ -153,6 +157,38 @@ def test_lights_that_are_off_are_not_taken_for_clay() -> None:
         wrong /= np.linalg.norm(wrong, axis=1, keepdims=True)
         found = seen_in(clay(normals, WAYS, roughness=0.0), under(wrong))
         assert found is None or found.rough == 0
+
+
+@numba.njit(error_model="numpy")  # kept nowhere: a test would not see that the loops have changed
+def fill_roughness(given: NDArray[np.float32], found: NDArray[np.float32]) -> None:
+    """Call the loops' part, which nothing outside of compiled functions can call."""
+    for i in range(given.shape[1]):
+        found[0, i], found[1, i], found[2, i] = rough_in_loops(given[0, i], given[1, i], given[2, i])
+
+
+def test_what_roughness_gains_with_a_turn_is_its_slope_in_the_loop_and_in_the_fit() -> None:
+    """Of any angles between normal, light and camera, beside the ones at which its formula changes."""
+    rng, step = np.random.default_rng(4), 1e-3
+    cosine, facing, towards = rng.uniform(0.1, 0.95, (3, 400))
+    beside = (np.abs(cosine - facing) > 0.02) & (np.abs(towards - cosine * facing) > 0.02)
+    cosine, facing, towards = (each[beside] for each in (cosine, facing, towards))
+
+    def added(cosine: Array, facing: Array) -> Array:
+        return np.asarray(cosine * np.maximum(towards - cosine * facing, 0) / np.maximum(cosine, facing), np.float64)
+
+    slopes = (
+        added(cosine, facing),
+        (added(cosine + step, facing) - added(cosine - step, facing)) / (2 * step),
+        (added(cosine, facing + step) - added(cosine, facing - step)) / (2 * step),
+    )
+    in_loops = np.empty((3, len(cosine)), np.float32)
+    fill_roughness(np.stack([cosine, facing, towards]).astype(np.float32), in_loops)
+    np.testing.assert_allclose(in_loops, slopes, rtol=1e-3, atol=1e-5)
+    lights = np.zeros((1, len(cosine), 3))
+    lights[0, :, 2] = towards
+    points = SubjectPoints(measured=lights[..., 0], counts=lights[..., 0], towards=lights, half=lights)
+    in_fit = rough_in_the_fit(points, np.outer(facing, (0, 0, 1)), cosine[None])
+    np.testing.assert_allclose([each[0] for each in in_fit], slopes, rtol=1e-3, atol=1e-5)
 
 
 def test_near_lights_show_the_same_sheen() -> None:
