@@ -123,6 +123,48 @@ def test_a_change_in_a_module_that_is_compiled_in_makes_kept_code_stale(tmp_path
     assert run() == (53, 1)
 
 
+CALLER = {
+    "caller.py": (
+        "from house.outer import whole\n"
+        "from psvideo.compute.compiled import FUSED\n"
+        "@FUSED.kept\n"
+        "def more(x):\n    return whole(x) + whole(x + 1)\n"
+    ),
+    "run.py": (
+        "import sys\n"
+        "from house.outer import whole\n"
+        "whole(10)\n"
+        "library = whole.overloads[whole.signatures[0]].library\n"
+        "held = library._shared_module is not None\n"
+        "if sys.argv[1] == 'both':\n"
+        "    from house.caller import more\n"
+        "    print(more(10), held, sum(more.stats.cache_hits.values()))\n"
+        "else:\n"
+        "    print(whole(10), held, sum(whole.stats.cache_hits.values()))\n"
+    ),
+}
+
+
+def test_a_kept_loop_is_loaded_without_what_only_compiling_needs_and_becomes_part_of_others(tmp_path: Path) -> None:
+    """LLVM's own form of every loop was 36 MB of a run, in which nothing is compiled."""
+    house = tmp_path / "house"
+    house.mkdir()
+    for name, text in (PARTS | CALLER).items():
+        (house / name).write_text(text)
+    paths = os.pathsep.join([str(tmp_path), str(SOURCE.parent)])
+    environment = os.environ | {"PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(which: str) -> list[str]:
+        command = [sys.executable, "-B", "-m", "house.run", which]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert run("one") == ["21", "True", "0"], "compiled, and made fit for others to keep it"
+    assert run("one") == ["21", "False", "1"], "loaded"
+    assert run("both") == ["44", "False", "0"], "another loop is compiled of the one that was loaded"
+    assert run("both") == ["44", "False", "1"]
+
+
 def test_code_kept_beside_its_module_is_found_whatever_folder_is_set_for_keeping(tmp_path: Path) -> None:
     house = tmp_path / "house"
     house.mkdir()

@@ -81,7 +81,7 @@ class _Once(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         print(
-            "psvideo: compiling, once: this run's loops for this processor, which takes up to a minute. They are kept "
+            "psvideo: compiling, once: this run's loops for this processor, which takes a minute or two. They are kept "
             "for all later runs; psvideo doctor --compile does it ahead.",
             file=sys.stderr,
         )

@@ -24,6 +24,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime.nrt import rtsys
 
+from psvideo.compute.loaded import loaded
 from psvideo.compute.parts import PART
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -62,7 +63,7 @@ class _Kept(_Cache):  # type: ignore[misc]
                 rtsys.initialize(target)  # all that kept code needs of numba; to compile, numba loads the rest itself
                 data = place.load(self._index_key(signature, target.codegen()))
                 if data is not None:
-                    return self._impl.rebuild(target, data)
+                    return loaded(target, data)
         LOG.info("compiling %s", self._name)
         return None
 
