@@ -132,6 +132,19 @@ def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_da
     assert timing.order == "marker"
 
 
+@pytest.mark.parametrize("ambient", [0.0, 0.1])
+def test_the_dark_slot_names_the_lights_where_no_row_opens_or_closes_during_a_flash(
+    ambient: float, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(shutter=0.8, readout=0.4, duration_s=0.0008)
+    plan = replace(plan, dark_s=plan.camera.frame_period_s - 0.0008)
+    shot = shoot(plan, phase_s=0.00525, ppm=0.0, ambient=ambient)
+    timing = timing_of(plan, shot)
+    assert any("no row opens or closes during a flash" in note for note in timing.notes)
+    assert timing.order == "marker"
+    assert names_right(timing, shot)
+
+
 def test_without_a_marker_the_names_are_called_a_guess_until_they_are_given(make_plan: PlanMaker) -> None:
     plan = make_plan(dark=False)
     shot = shoot(plan)

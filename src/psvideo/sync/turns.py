@@ -26,6 +26,8 @@ PLAIN = 6.0
 MOST_AGAINST = 0.1
 MIXED_WELL, MIXED_BADLY = 0.1, 4.0
 """Powers decide the turn where one leaves less than this of the brightnesses, and all others that many times more."""
+TAKES_AWAY = 0.1
+"""A light that seems to take so much light away, as a share of what the strongest gives, bears a wrong name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +44,7 @@ def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
     part = _part(plan, rows)
     best = _fitted(plan, part, beat, period=same[1] if len(same) > 1 else len(plan.cycle_slots))
     alike = [turned(plan, one, turn) for one in best for turn in _decided_by_power(plan, rows, one, same)]
+    alike = [one for one in alike if not _takes_away(plan, part, one)] or alike
     names = {
         tuple(tuple(sorted(plan.flashes[s].lights.items())) for s in _seen_slots(plan, one, beat)) for one in alike
     }
@@ -98,6 +101,16 @@ def _beaten(gain: FloatArray) -> bool:
     against = float(-np.minimum(gain, 0.0).sum())
     plainly = total > PLAIN and against < MOST_AGAINST * total
     return plainly or (total / error > SURE and total / len(gain) > 0.02)
+
+
+def _takes_away(plan: Plan, rows: Profiles, beat: Beat) -> bool:
+    """Return whether a light seems to take light away under a beat's names, as none does.
+
+    Where every frame sees one flash, and sees it whole, one light is as good as another for the light of the room: what
+    is left for the true dark slot is then less than none.
+    """
+    level = brightnesses(plan, rows.one_window(), beat)[:, 1 : len(plan.lit_slots) + 1].mean(axis=0)
+    return bool(level.min() < -TAKES_AWAY * level.max())
 
 
 def _decided_by_power(plan: Plan, rows: Profiles, beat: Beat, same: Sequence[int]) -> Sequence[int]:
