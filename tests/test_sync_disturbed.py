@@ -216,6 +216,23 @@ def test_flashes_that_stray_are_followed_one_by_one(make_plan: PlanMaker) -> Non
     assert timing.phase_error_rows * timing.row_time_s < 1e-5
 
 
+def test_flashes_that_stray_are_followed_where_few_rows_open_and_close_during_the_same_flash(
+    make_plan: PlanMaker,
+) -> None:
+    plan = make_plan(height_px=96, width_px=COLUMNS, shutter=0.52, readout=0.55, duration_s=0.001)
+    row_s = plan.camera.row_time_s
+    ends = np.ones((96, 1), np.float32)
+    ends[:14] = ends[-14:] = 0.04
+    dim = {slot: plate * ends for slot, plate in plates(plan).items()}
+    shot = shoot(plan, frames=60, jitter_s=0.3 * row_s, scene=dim, noise=Noise(full_well_e=8000, read_e=8))
+    timing = timing_of(plan, shot)
+    lit = [flash for flash in timing.flashes if flash.complete and flash.lights]
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    error_s = np.array([np.abs(true_s - flash.start_s).min() for flash in lit])
+    assert np.sqrt(np.mean(error_s**2)) < 2 * timing.phase_error_rows * row_s
+    assert np.median(error_s) < 0.1 * row_s
+
+
 def test_frames_missing_without_a_hole_are_found_numbered_and_bridged(plan: Plan) -> None:
     shot = shoot(plan, dropped=(20, 21, 50))
     timing = timing_of(plan, shot, numbers=range(101, 101 + len(shot.frames)))

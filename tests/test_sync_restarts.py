@@ -1,6 +1,7 @@
 """A strobe that stops during a clip, or begins late or anew elsewhere in its cycle: each part is timed by itself."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import TICKS, moved
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
-from psvideo.synth import Exposure, Noise, TrueClock, expose
+from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 FRAMES, BREAK = 120, 63
@@ -250,3 +251,27 @@ def test_a_clock_that_jumps_by_little_shows_in_the_error_and_is_told(cut: int, p
     assert np.sqrt(np.mean(off**2)) > 0.05
     assert np.sqrt(np.mean(off**2)) < 2 * timing.phase_error_rows
     assert any("come early or late against all the others" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(("seed", "again"), [(2, 10), (3, 10)])
+def test_a_frame_that_is_repeated_early_in_a_noisy_clip_is_no_restart(
+    seed: int, again: int, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(lights=tuple("abcde"), dark=False, height_px=48, width_px=12, readout=0.25, duration_s=0.0005)
+    plan = replace(plan, flashes=(replace(plan.flashes[0], duration_s=0.00075), *plan.flashes[1:]))
+    rng = np.random.default_rng(seed)
+    plates = {slot: (0.1 + 0.5 * rng.random((48, 12))).astype(np.float32) for slot in plan.lit_slots}
+    shot = expose(
+        plates,
+        plan,
+        frames=45,
+        clock=TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=30.0),
+        ambient=0.15,
+        mains=MainsSwing(hz=120, depth=0.15),
+        noise=Noise(full_well_e=2000, read_e=15),
+        seed=seed,
+    )
+    profiles = shot.frames.mean(axis=2, dtype=np.float64)
+    timing = find_timing(plan, np.arange(46), np.insert(profiles, again, profiles[again - 1], axis=0))
+    assert timing.repeated_frames == (again,)
+    assert not any("started again" in note for note in timing.notes)

@@ -38,6 +38,8 @@ WHOLE_FRAMES = 0.125
 """A move that is whole frames to within this share of the shortest flash is frames that are missing."""
 APART = 0.1
 """Beside a hole, flashes that come earlier or later than it says by this share of the shortest one have moved."""
+HALVES = 0.5
+"""The move must leave less than this share of the frames' losses where the clock is fitted to all of them again."""
 TICKS = 1_000_000
 """Places in time between frames are counted in such parts of a frame."""
 MOSTLY = 0.8
@@ -213,21 +215,32 @@ def _beside_holes(plan: Plan, rows: Profiles, tracked: FrameTrack) -> int | None
 
 
 def _apart(plan: Plan, rows: Profiles, at: int, beat: Beat) -> bool:
-    """Return whether flashes from a frame on come clearly earlier or later than those before it foretell."""
+    """Return whether flashes from a frame on come clearly earlier or later than those before it foretell.
+
+    A few frames foretell badly, so that the clock is fitted to all frames again, with the move and without.
+    """
     rows = rows.one_window()
     near = refined_beat(plan, rows.take(slice(0, at)), beat, steps=4, first_scale=0.1)
     ticks = moved(rows, 0.0)
 
-    def left(shift_s: float) -> float:
+    def gone(shift_s: float) -> Profiles:
         index = ticks.index.copy()
         index[at:] += round(shift_s / rows.period_s * TICKS)
-        tried = replace(ticks, index=index)
-        return float(frame_losses(rows, unexplained(plan, tried, near)).sum())
+        return replace(ticks, index=index)
+
+    def left(tried: Profiles, beat: Beat) -> float:
+        return float(frame_losses(rows, unexplained(plan, tried, beat)).sum())
+
+    def fitted_again(tried: Profiles) -> float:
+        return left(tried, refined_beat(plan, tried, near, steps=4, first_scale=0.1))
 
     shifts_s = np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS * 0.5 * plan.shortest_flash_s
-    losses = np.array([left(one) for one in shifts_s.tolist()])
+    losses = np.array([left(gone(one), near) for one in shifts_s.tolist()])
     best = int(losses.argmin())
-    return abs(float(shifts_s[best])) > APART * plan.shortest_flash_s and losses[FINE_PARTS] - losses[best] > HOLDS
+    best_s = float(shifts_s[best])
+    if abs(best_s) <= APART * plan.shortest_flash_s or losses[FINE_PARTS] - losses[best] <= HOLDS:
+        return False
+    return fitted_again(gone(best_s)) < HALVES * fitted_again(ticks)
 
 
 def reach(plan: Plan, rows: Profiles, found: ClipFit, frames: slice, *, sign: int) -> int:

@@ -22,6 +22,9 @@ from psvideo.sync.rowfit.row_model import Flashes
 LEAST_FLASHES = 8
 SURE = 5.0
 """Standard deviations of Fisher's z (1921) by which openings and closings must agree before flashes are moved."""
+FEW, LIKELY = 0.5, 2.5
+"""Where so small a share of the flashes has both, as below 360 degrees, these few need agree by so much only, if even
+and odd rows agree as well."""
 ALIKE = 1 - 1e-9
 ROUNDS = 4
 """Flashes are moved, and looked at again where they then are: brightnesses had taken up some of what they strayed."""
@@ -98,8 +101,12 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
 def _straying(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[float, float] | None:
     """Return by how much flashes stray, and a pull's noise: its variance over its stiffness; None where none do."""
     pull, stiff = pulls(rows, fit, flashes)
-    if _timed(stiff).sum() >= LEAST_FLASHES:
-        return _agreed(pull, stiff, over=1.0)
+    both = _timed(stiff)
+    if both.sum() >= LEAST_FLASHES:
+        found = _agreed(pull, stiff, over=1.0)
+        few = both.sum() < FEW * (stiff > 0).any(axis=1).sum()
+        if found is not None or not few or _agreed(pull, stiff, over=1.0, sure=LIKELY) is None:
+            return found
     if gain_of(rows, fit.rest) < STILL:
         return None
     halves = [pulls(rows.only_rows(half), fit, flashes, half) for half in (slice(0, None, 2), slice(1, None, 2))]
@@ -116,10 +123,13 @@ def _timed(stiff: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((stiff > ENOUGH * usual).all(axis=1), np.bool_)
 
 
-def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float) -> tuple[float, float] | None:
+def _agreed(
+    pull: FloatArray, stiff: FloatArray, *, over: float, sure: float = SURE
+) -> tuple[float, float] | None:
     """Return by how much flashes stray and the noise, as two kinds of rows (flash, 2) show both.
 
-    None where they do not agree, or on no more than ``over`` times what noise makes of their mean, as variances.
+    None where they do not agree by ``sure`` standard deviations, or on no more than ``over`` times what noise makes of
+    their mean, as variances.
     """
     timed = _timed(stiff)
     if timed.sum() < LEAST_FLASHES:
@@ -131,7 +141,7 @@ def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float) -> tuple[float,
     common, own = float((apart[:, 0] * apart[:, 1]).mean()), (apart**2).mean(axis=0)
     likeness = common / max(float(np.sqrt(own[0] * own[1])), 1e-30)
     by_noise = float(((apart[:, 0] - apart[:, 1]) ** 2).mean()) / 4
-    if common < over * by_noise or np.arctanh(min(likeness, ALIKE)) * np.sqrt(len(apart) - 3) < SURE:
+    if common < over * by_noise or np.arctanh(min(likeness, ALIKE)) * np.sqrt(len(apart) - 3) < sure:
         return None
     noise = float(((apart[:, 0] - apart[:, 1]) ** 2 / (1.0 / stiff[timed]).sum(axis=1)).mean())
     return float(np.sqrt(common)), noise
