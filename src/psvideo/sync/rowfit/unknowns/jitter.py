@@ -123,9 +123,7 @@ def _timed(stiff: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((stiff > ENOUGH * usual).all(axis=1), np.bool_)
 
 
-def _agreed(
-    pull: FloatArray, stiff: FloatArray, *, over: float, sure: float = SURE
-) -> tuple[float, float] | None:
+def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float, sure: float = SURE) -> tuple[float, float] | None:
     """Return by how much flashes stray and the noise, as two kinds of rows (flash, 2) show both.
 
     None where they do not agree by ``sure`` standard deviations, or on no more than ``over`` times what noise makes of
