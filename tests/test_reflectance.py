@@ -142,6 +142,14 @@ def test_what_is_matte_beside_clay_stays_matte(monkeypatch: pytest.MonkeyPatch) 
     assert off[:, ~rough].mean() <= 1.05 * before[:, ~rough].mean()
 
 
+@pytest.mark.parametrize(("roughness", "lean_counts"), [(0.08, False), (0.3, True)])
+def test_facets_that_lean_by_little_are_no_clay(roughness: float, lean_counts: bool) -> None:
+    """They turn normals by a fraction of a degree, as much as faults that come and go from round to round."""
+    normals, ways = waves(), np.concatenate([ring(4, 50), ring(1, 5)])
+    found = seen_in(clay(normals, ways, roughness=roughness), under(ways))
+    assert (found is not None and found.rough > 0) == lean_counts
+
+
 def test_what_is_dark_under_grazing_light_is_not_taken_for_clay() -> None:
     """A black level that was not taken off looks like roughness and a curve at once, and is neither."""
     normals = waves()

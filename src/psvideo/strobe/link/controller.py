@@ -87,5 +87,5 @@ def _cannot_open(device: str, fault: Exception) -> str:
     elif "No such file" in reason or "FileNotFound" in reason or "could not open port" in reason:
         why = "there is no such port, or it cannot be opened; psvideo strobe list shows what there is"
     else:
-        why = "is no serial port, or one that does not answer; psvideo strobe list shows what there is"
+        why = "cannot be opened: no serial port, or one that does not answer; psvideo strobe list shows what there is"
     return f"{device}: {why} ({reason})."

@@ -35,6 +35,8 @@ HOPELESS = 0.02
 NUMBERS, ROUGH, SHINE, LESS_LEFT = 5, 1, 2, 0.8
 """The model's numbers, which of them is roughness, where highlights begin, and what roughness leaves at most of what is
 left without it, to count: under lights whose directions are wrong it explains a tenth, of clay half."""
+LEAST_ROUGH = 0.1
+"""What is less rough (facets that lean by 9 degrees) turns normals by less than a degree, and other faults look alike."""
 PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3), 300.0
 """The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
@@ -85,7 +87,7 @@ def fitted(points: SubjectPoints, normals: Values) -> Reflectance | None:
     rough, by_rough = np.zeros(NUMBERS), 0.0
     if spread[0] < WELL_SPREAD * spread[-1]:
         rough, by_rough = _alternated(points, g, typical, rough=True)
-    if 1 - by_rough < LESS_LEFT * (1 - explained):
+    if rough[ROUGH] >= LEAST_ROUGH and 1 - by_rough < LESS_LEFT * (1 - explained):
         model, explained = rough, by_rough
     elif len(points.measured) < FOR_SHINE:
         return None
