@@ -36,7 +36,7 @@ NUMBERS, ROUGH, SHINE, LESS_LEFT = 5, 1, 2, 0.8
 """The model's numbers, which of them is roughness, where highlights begin, and what roughness leaves at most of what is
 left without it, to count: under lights whose directions are wrong it explains a tenth, of clay half."""
 LEAST_ROUGH = 0.1
-"""What is less rough (facets that lean by 9 degrees) turns normals by less than a degree, and other faults look alike."""
+"""What is less rough (facets that lean by 9 degrees) turns normals by less than a degree. Other faults look like it."""
 PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3), 300.0
 """The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
