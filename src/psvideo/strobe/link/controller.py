@@ -78,6 +78,9 @@ class OpenPort:
         )
 
 
+_LISTED = "psvideo strobe list shows what there is"
+
+
 def _cannot_open(device: str, fault: Exception) -> str:
     reason = str(fault)
     if "exclusively lock" in reason or "Resource busy" in reason or "in use" in reason:
@@ -85,7 +88,7 @@ def _cannot_open(device: str, fault: Exception) -> str:
     if "Permission" in reason or "Access is denied" in reason:
         why = "may not be opened by this user; on Linux join the group that owns it (dialout), then log in again"
     elif "No such file" in reason or "FileNotFound" in reason or "could not open port" in reason:
-        why = "there is no such port, or it cannot be opened; psvideo strobe list shows what there is"
+        why = f"there is no such port, or it cannot be opened; {_LISTED}"
     else:
-        why = "cannot be opened: no serial port, or one that does not answer; psvideo strobe list shows what there is"
+        why = f"cannot be opened: it is no serial port, or one that does not answer; {_LISTED}"
     return f"{device}: {why} ({reason})."
