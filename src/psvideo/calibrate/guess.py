@@ -21,7 +21,7 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.choices import Prior
-from psvideo.model.rig import Light, Rig
+from psvideo.model.rig import Light, Rig, vector
 
 LEAST_FOR_EQUAL_LIGHTS = 6
 LEAST_PIXELS = 1000
@@ -96,16 +96,10 @@ def _rig_of(names: Sequence[str], lit: FloatArray) -> Rig:
     strengths = lengths / lengths.mean()
     return Rig(
         lights=tuple(
-            Light(
-                name=name, direction=_vector(way / length), intensity=(float(f"{strength:.6g}"),), error_deg=ERROR_DEG
-            )
+            Light(name=name, direction=vector(way / length), intensity=(float(f"{strength:.6g}"),), error_deg=ERROR_DEG)
             for name, way, length, strength in zip(names, lit, lengths, strengths, strict=True)
         )
     )
-
-
-def _vector(values: FloatArray) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
 
 
 def _lit_by_all(pictures: LightPictures, grey: FloatArray) -> NDArray[np.bool_]:

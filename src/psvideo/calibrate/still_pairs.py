@@ -12,6 +12,7 @@ from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
 from psvideo.formats.paths import check_file
+from psvideo.model.units import listed
 
 FEWEST = 3
 LISTED = 6
@@ -165,16 +166,12 @@ def _misnamed(
             f"{folder}: {name!r} of {whose} may be {one[0].name} or {one[1].name}. Expected one picture for each name: "
             "move the other elsewhere, or write the whole file name into the list."
         )
-    more = f" Pictures without a light: {_list(free)}." if free else ""
+    more = f" Pictures without a light: {listed(free, LISTED)}." if free else ""
     return (
-        f"{folder}: {whose} names {_list(none)}, and no picture is called so, though {len(known) - len(none)} others "
-        f"are found by name.{more} Expected one picture for each light: correct the names, or take these lines out."
+        f"{folder}: {whose} names {listed(none, LISTED)}, and no picture is called so, though "
+        f"{len(known) - len(none)} others are found by name.{more} Expected one picture for each light: correct the "
+        "names, or take these lines out."
     )
-
-
-def _list(names: Sequence[str]) -> str:
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return ", ".join(map(str, names[:LISTED])) + more
 
 
 def _shown(known: Sequence[str], files: Sequence[Path]) -> str:

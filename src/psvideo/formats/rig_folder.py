@@ -5,6 +5,7 @@ from pathlib import Path
 
 from psvideo.errors import PsvideoError, UsageError, nearest
 from psvideo.formats.paths import path_of, take_name
+from psvideo.model.units import listed
 
 RIGS = (".toml", ".lp", ".txt")
 """What rigs and light lists end with."""
@@ -43,10 +44,9 @@ def check_rigs(rig: Path | str | None, clips: Sequence[Path | str]) -> None:
     if len(missing) == 1:
         raise missing[0][1]
     if missing:
-        more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
-        named = ", ".join(take_name(clip) for clip, _ in missing[:NAMED])
+        named = listed([take_name(clip) for clip, _ in missing], NAMED)
         raise UsageError(
-            f"`rig` {rig}: holds no rig, or several, for {len(missing)} of {len(clips)} takes: {named}{more}. A take's "
+            f"`rig` {rig}: holds no rig, or several, for {len(missing)} of {len(clips)} takes: {named}. A take's "
             f"rig is named after it: {take_name(missing[0][0])}.toml. {_advice(path_of('rig', rig), '')}"
         )
 

@@ -12,7 +12,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
 from psvideo.formats.light_lists.light_list_reader import read_light_list
 from psvideo.formats.paths import path_of
-from psvideo.model.rig import Light, Rig, Vector
+from psvideo.model.rig import Light, Rig, Vector, vector
 
 SCHEMA = "psvideo-rig/1"
 UNIT_LENGTH_TOLERANCE = 0.01
@@ -155,7 +155,7 @@ def parse_rig(text: str, *, source: str = "rig") -> Rig:
         focal_px=None if view.focal_px is None else (view.focal_px[0], view.focal_px[1]),
         principal_px=None if view.principal_px is None else (view.principal_px[0], view.principal_px[1]),
         plane=None if (at := surface.plane) is None else (at[0], at[1], at[2], at[3]),
-        surface_colour=None if surface.colour is None else _vector(surface.colour),
+        surface_colour=None if surface.colour is None else vector(surface.colour),
     )
 
 
@@ -165,23 +165,19 @@ def _light(file: _RigLight) -> Light:
         name=file.name,
         intensity=tuple(strength),
         direction=None if file.direction is None else _unit(file.direction),
-        position_m=None if file.position_m is None else _vector(file.position_m),
+        position_m=None if file.position_m is None else vector(file.position_m),
         error_deg=file.error_deg,
         reference_duration_s=file.reference_duration_s,
         anisotropy=file.anisotropy,
         axis=None if file.axis is None else _unit(file.axis),
-        colour=None if file.colour is None else _vector(file.colour),
+        colour=None if file.colour is None else vector(file.colour),
     )
-
-
-def _vector(values: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]]) -> Vector:
-    return float(values[0]), float(values[1]), float(values[2])
 
 
 def _unit(values: Sequence[float]) -> Vector:
     """Return a vector of exactly unit length; one that is so already to 1e-12 keeps its digits."""
     length = float(np.linalg.norm(values))
-    return _vector(values) if abs(length - 1.0) < 1e-12 else _vector(np.asarray(values, np.float64) / length)
+    return vector(values) if abs(length - 1.0) < 1e-12 else vector(np.asarray(values, np.float64) / length)
 
 
 def format_rig(rig: Rig) -> str:

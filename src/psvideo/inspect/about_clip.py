@@ -16,7 +16,7 @@ from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.rows.clipping import SATURATED
-from psvideo.model.units import counted
+from psvideo.model.units import counted, listed
 
 MANY = 3
 SATURATED_SHARE = 0.01
@@ -86,12 +86,11 @@ def _hole_findings(clip: Clip) -> Iterator[Finding]:
     found = clip.dropped
     if not found:
         return
-    shown = ", ".join(f"{count} after {after}" for after, count in found[:MANY])
-    more = f" and {len(found) - MANY} more places" if len(found) > MANY else ""
+    shown = listed([f"{count} after {after}" for after, count in found], MANY, things="places")
     if clip.plan.mode == "synced":
-        yield ok(f"the numbers have holes ({shown}{more}): these frames, and the flashes in them, are missing")
+        yield ok(f"the numbers have holes ({shown}): these frames, and the flashes in them, are missing")
     else:
-        yield warn(f"{counted(sum(count for _, count in found), 'frame')} dropped: {shown}{more}")
+        yield warn(f"{counted(sum(count for _, count in found), 'frame')} dropped: {shown}")
 
 
 def _likeness_findings(clip: Clip) -> Iterator[Finding]:

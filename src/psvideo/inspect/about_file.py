@@ -18,10 +18,11 @@ from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.about_output import describe_output, output_around
 from psvideo.inspect.about_plan import plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, fault, ok, warn
-from psvideo.model.units import counted
+from psvideo.model.units import MISNAMED_PPM, counted
 from psvideo.strobe.runlog import as_played, read_log
 
-MISNAMED_PPM = (900.0, 1100.0)
+NEAR_PPM = 100.0
+"""A clock that is off by what a misnamed rate makes, to this much, speaks of one: cameras' clocks are better."""
 OF_A_FOLDER = ("psvideo-delivery", "psvideo-report")
 """What stands for the folder in which it lies."""
 LIGHT_LISTS = (".lp", ".txt")
@@ -112,7 +113,7 @@ def _timing(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
         else ok(f"the order of the lights was found by {timing.order}")
     )
     offset = f"the strobe's clock is {timing.clock_offset_ppm:+.4g} ppm off the camera's"
-    misnamed = MISNAMED_PPM[0] < abs(timing.clock_offset_ppm) < MISNAMED_PPM[1]
+    misnamed = abs(abs(timing.clock_offset_ppm) - MISNAMED_PPM) < NEAR_PPM
     findings.append(warn(f"{offset}: the frame rate is likely misnamed by 1000/1001") if misnamed else ok(offset))
     dropped = sum(hole.count for hole in timing.dropped_frames)
     if dropped:

@@ -11,10 +11,10 @@ from psvideo.live.chain import NewestRound
 from psvideo.live.status import LiveStatus
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
+from psvideo.model.rows.clipping import brightest_channel
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judgement import Judgement, gravest_first, verdict_of
-from psvideo.report.observe.facts import brightest_channel
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lens

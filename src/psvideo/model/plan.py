@@ -136,6 +136,10 @@ class Plan:
         rows = [[self.flashes[slot].lights.get(name, 0.0) for name in self.lights] for slot in self.lit_slots]
         return np.array(rows, np.float64).reshape(len(self.lit_slots), len(self.lights))
 
+    def powers(self, light: str) -> tuple[float, ...]:
+        """Return a light's power in every flash of the list, 0 where it is off."""
+        return tuple(flash.lights.get(light, 0.0) for flash in self.flashes)
+
     def train(self, first: int, count: int) -> FlashTrain:
         """Return flashes ``first`` to ``first + count - 1``, counted from a cycle's start, which is at 0 s.
 

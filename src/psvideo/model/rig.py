@@ -16,6 +16,11 @@ from psvideo.model.units import counted
 Vector = tuple[float, float, float]
 
 
+def vector(values: Sequence[float] | FloatArray) -> Vector:
+    """Return three numbers as records hold them."""
+    return float(values[0]), float(values[1]), float(values[2])
+
+
 def three_numbers(name: str, given: object, expected: str) -> FloatArray:
     """Return a parameter as three numbers, shape (3,); raises UsageError where it is anything else."""
     try:

@@ -1,9 +1,12 @@
-"""Times and frame rates as people write them."""
+"""Times, frame rates, and how many there are of something, as people write them."""
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 NTSC = Fraction(1000, 1001)
 """What broadcast rates are slower than whole ones by."""
+MISNAMED_PPM = 1000.0
+"""By how much a clock seems off where such a rate is taken for the whole one, or the other way round."""
 
 
 def counted(count: int, thing: str) -> str:
@@ -15,6 +18,16 @@ def counted(count: int, thing: str) -> str:
     if count == 1:
         return f"{count} {thing}"
     return f"{count} {thing}{'es' if thing.endswith(('s', 'sh', 'ch', 'x')) else 's'}"
+
+
+def listed(words: Sequence[object], most: int, *, things: str = "") -> str:
+    """Return the first ``most`` of several words in a row, and how many more ``things`` there are.
+
+    >>> listed(["key", "left", "right"], 2), listed([7, 9], 2), listed([7, 9, 11, 20], 2, things="places")
+    ('key, left and 1 more', '7, 9', '7, 9 and 2 more places')
+    """
+    more = f" and {len(words) - most} more {things}".rstrip() if len(words) > most else ""
+    return ", ".join(map(str, words[:most])) + more
 
 
 def show_seconds(seconds: float, *, figures: int = 4) -> str:

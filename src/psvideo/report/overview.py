@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psvideo import __version__
-from psvideo.model.units import counted
+from psvideo.model.units import counted, listed
 from psvideo.report.html import MARKS, PAGE
 from psvideo.report.style import STYLE
 
@@ -88,6 +88,4 @@ def _counts(bad: Sequence[int], doubtful: Sequence[int]) -> str:
 
 
 def _names(lines: Sequence[TakeLine], numbers: Sequence[int]) -> str:
-    names = [f'<a href="#take{n}">{html.escape(lines[n].name)}</a>' for n in numbers[:MOST_NAMES]]
-    more = f" and {len(numbers) - MOST_NAMES} more" if len(numbers) > MOST_NAMES else ""
-    return ", ".join(names) + more
+    return listed([f'<a href="#take{n}">{html.escape(lines[n].name)}</a>' for n in numbers], MOST_NAMES)

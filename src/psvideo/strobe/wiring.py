@@ -17,7 +17,7 @@ def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, 
                 f"{caps.lines - 1}."
             )
         twin = next((other for other, taken in given.items() if taken == line and other != name), None)
-        if twin is not None and _powers(plan, twin) != _powers(plan, name):
+        if twin is not None and plan.powers(twin) != plan.powers(name):
             raise UsageError(
                 f"`line` {name}={line}: {twin} has line {line} already, and the two do not flash together at one power "
                 "in every flash. Give each its own line."
@@ -40,16 +40,11 @@ def refuse_unknown_lights(plan: Plan, given: Mapping[str, int]) -> None:
             raise UsageError(f"`line` {name}={line}: the plan has no such light: {nearest(name, plan.lights)}")
 
 
-def _powers(plan: Plan, light: str) -> tuple[float, ...]:
-    """Return a light's power in every flash of the list."""
-    return tuple(flash.lights.get(light, 0.0) for flash in plan.flashes)
-
-
 def _how_with_fewer(plan: Plan, caps: Capabilities) -> str:
     """Return how lights that always flash together share lines, where that is enough; else nothing."""
     together: dict[tuple[float, ...], list[str]] = {}
     for name in plan.lights:
-        together.setdefault(_powers(plan, name), []).append(name)
+        together.setdefault(plan.powers(name), []).append(name)
     if not len(together) <= caps.lines < len(plan.lights):
         return ""
     words = ", ".join(f"`line` {','.join(names)}={line}" for line, names in enumerate(together.values()))

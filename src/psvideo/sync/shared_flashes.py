@@ -15,13 +15,11 @@ from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 from psvideo.model.marker import cycle_places
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.model.units import counted
+from psvideo.model.units import MISNAMED_PPM, counted
 from psvideo.strobe.runlog import CAMERA_CLOCK_PPM
 
 LEAST_SHARED = 8
 """Flashes that two clips must share: a rate from fewer says nothing."""
-MISNAMED_PPM = 1000.0
-"""By how much a frame rate that is misnamed by 1.001 moves a clock."""
 CLEAR = 4.0
 """Standard errors by which a drift, or another strobe, must show."""
 LEAST_ERROR_S = 0.2e-6

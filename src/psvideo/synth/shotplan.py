@@ -7,7 +7,7 @@ import numpy as np
 from psvideo.formats.plan_toml import parse_fps
 from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.rig import Light, Rig, Vector
+from psvideo.model.rig import Light, Rig, Vector, vector
 from psvideo.synth.camera.encode import codes_of
 from psvideo.synth.lamps.true_flashes import TrueClock
 from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
@@ -84,21 +84,16 @@ def _light(table: LightTable, reference_duration_s: float | None) -> Light:
         name=table.name,
         intensity=tuple(strength),
         direction=None if table.direction is None else _unit(table.direction),
-        position_m=None if table.position_m is None else _vector(table.position_m),
+        position_m=None if table.position_m is None else vector(table.position_m),
         reference_duration_s=reference_duration_s,
         anisotropy=table.anisotropy or None,
         axis=None if table.axis is None else _unit(table.axis),
-        colour=None if table.colour is None else _vector(table.colour),
+        colour=None if table.colour is None else vector(table.colour),
     )
 
 
-def _vector(values: list[float]) -> Vector:
-    return values[0], values[1], values[2]
-
-
 def _unit(values: list[float]) -> Vector:
-    x, y, z = np.asarray(values, np.float64) / np.linalg.norm(values)
-    return float(x), float(y), float(z)
+    return vector(np.asarray(values, np.float64) / np.linalg.norm(values))
 
 
 def true_clock(scene: Scene) -> TrueClock:

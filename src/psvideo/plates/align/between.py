@@ -4,7 +4,6 @@ What was hidden in one of the plates is taken from the other. Blending by time a
 where a surface turns. Where nothing moves, or motion explains nothing better, the nearer plate is taken as it is.
 """
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
+from psvideo.model.rows.clipping import brightest_channel
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.moving import Followed
@@ -150,7 +150,7 @@ class _Rows:
         if brightest > full / OVERSHOOT:
             np.minimum(image, np.float32(full * JUST_BELOW), out=image)
         if brightest >= full:
-            clipped = (_brightest(light) >= full).astype(np.uint8)
+            clipped = (brightest_channel(light) >= full).astype(np.uint8)
             wider = cv2.dilate(clipped, np.ones((BESIDE_CLIPPED, BESIDE_CLIPPED), np.uint8))
             row, col = _nearest((y_shown, x), clipped.shape)
             beside = wider[row, col] > 0
@@ -165,11 +165,6 @@ def _nearest(places: tuple[Vectors, Vectors], shape: tuple[int, ...]) -> list[ND
     """Return the row and the column of the nearest pixel within a picture."""
     each = zip(places, shape, strict=True)
     return [np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in each]
-
-
-def _brightest(image: Image) -> Image:
-    # channel by channel: numpy is slow along a short last axis
-    return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
 
 
 def _fill(

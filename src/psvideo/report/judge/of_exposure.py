@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import LEAST_LIGHTS, NAMED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
@@ -102,8 +103,7 @@ def first_of(shares: Mapping[str, float]) -> str:
     "'b' 50 %, 'd' 30 %, 'a' 20 %, 'c' 10 % and 1 more"
     """
     largest = sorted(shares.items(), key=lambda named: -named[1])
-    more = f" and {len(largest) - NAMED} more" if len(largest) > NAMED else ""
-    return ", ".join(f"{light!r} {100 * share:.0f} %" for light, share in largest[:NAMED]) + more
+    return listed([f"{light!r} {100 * share:.0f} %" for light, share in largest], NAMED)
 
 
 def _half(stops: float) -> str:

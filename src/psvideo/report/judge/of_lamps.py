@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.marker import NOT_FIRING
+from psvideo.model.units import listed
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import TARGET_QUANTILE
@@ -100,7 +101,7 @@ def _weak(
             subject="lights",
             grade="doubtful",
             found=f"{len(weak)} of {len(lights)} lights are weak: less than {100 * WEAK_LIGHT:.0f} % of the strongest "
-            f"({', '.join(map(repr, weak[:NAMED]))} and {len(weak) - NAMED} more).",
+            f"({listed([repr(light) for light in weak], NAMED)}).",
             advice="Raise their power or their flash duration, or move them nearer.",
         )
     if relative.max() <= 0:  # nothing is lit, which is said once
@@ -135,13 +136,12 @@ def _weaker_than_rig(light: str, share: float, says: float, *, lights: int) -> J
 def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool) -> Judgement:
     """Say which lamps do not fire, which is bad where too few others do; ``missed``: rows see them in no round."""
     enough = others >= LEAST_LIGHTS
-    named = ", ".join(f"{light!r}" for light, _ in dead[:NAMED])
-    more = f" and {len(dead) - NAMED} more" if len(dead) > NAMED else ""
+    named = listed([repr(light) for light, _ in dead], NAMED)
     most = f"{100 * max(0.0, *(share for _, share in dead)):.1f} % of the strongest"
     one = len(dead) == 1
     what = f"The light {named} gives no light ({most})"
     if not one:
-        what = f"{len(dead)} lights give no light ({named}{more}; at most {most})"
+        what = f"{len(dead)} lights give no light ({named}; at most {most})"
     return Judgement(
         subject="lights",
         grade="doubtful" if enough else "bad",
@@ -165,7 +165,7 @@ def _missed(
     missed = level < MISSED * usual
     empty = missed[:, alive].all(axis=1) & (alive.sum() > 1)
     if empty.any():
-        named = _numbers([one.number for one, none in zip(facts, empty, strict=True) if none])
+        named = listed([one.number for one, none in zip(facts, empty, strict=True) if none], NAMED)
         yield Judgement(
             subject="lights",
             grade="doubtful",
@@ -180,14 +180,9 @@ def _missed(
                 subject="lights",
                 grade="bad" if len(numbers) > 0.1 * len(facts) else "doubtful",
                 found=f"The light {light!r} failed or was covered in {len(numbers)} of {len(facts)} rounds "
-                f"({_numbers(numbers)}).",
+                f"({listed(numbers, NAMED)}).",
                 advice="Check its driver and supply; these rounds' normals are wrong.",
             )
-
-
-def _numbers(numbers: Sequence[int]) -> str:
-    more = f" and {len(numbers) - NAMED} more" if len(numbers) > NAMED else ""
-    return ", ".join(map(str, numbers[:NAMED])) + more
 
 
 def _unsteady(

@@ -16,11 +16,7 @@ def power_words(plan: Plan, observed: Observed) -> dict[str, str]:
     """Return for every light that was seen what to set its power to, as a sentence."""
     levels = {light: observed.levels(light) for light in plan.lights if light in observed.counts}
     whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
-    return {light: _words(_planned(plan, light), one, whole) for light, one in levels.items()}
-
-
-def _planned(plan: Plan, light: str) -> float:
-    return max(flash.lights.get(light, 0.0) for flash in plan.flashes)
+    return {light: _words(max(plan.powers(light)), one, whole) for light, one in levels.items()}
 
 
 def _words(planned: float, levels: Levels, whole: list[Levels]) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judge.result import COMMON_DEG
 from psvideo.report.judgement import Grade, Judgement
@@ -56,8 +57,8 @@ def rig_misfits(lights: Sequence[str], fit: RigFit) -> Judgement | None:
     found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
     if by_strength:
         off.sort(key=lambda one: -abs(float(np.log(max(one[1], 1e-6)))))
-        named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off[:NAMED])
-        named += f" and {len(off) - NAMED} more," if len(off) > NAMED else ""
+        named = listed([f"{light!r} {100 * strength:.0f} %" for light, strength in off], NAMED)
+        named += "," if len(off) > NAMED else ""
         return Judgement(
             subject="rig",
             grade=grade,

@@ -9,7 +9,7 @@ from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_st
 from psvideo.model.cost.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.model.units import counted
+from psvideo.model.units import counted, listed
 from psvideo.report.judge.of_ambient import NOTICED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.astray import LEAST_SHOWN_PX
@@ -171,13 +171,12 @@ def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
     missing = sum(hole.count for hole in holes)
     spoilt = [one.number for one in observed.facts if one.unseen_share > 0]
     if missing:
-        where = ", ".join(f"{hole.count} after number {hole.after}" for hole in holes[:NAMED])
-        more = f" and {len(holes) - NAMED} more places" if len(holes) > NAMED else ""
+        where = listed([f"{hole.count} after number {hole.after}" for hole in holes], NAMED, things="places")
         grave = len(spoilt) > 0.1 * max(len(observed.facts), 1) and len(spoilt) > 1
         yield Judgement(
             subject="frames",
             grade="doubtful",
-            found=f"{counted(missing, 'frame')} {'is' if missing == 1 else 'are'} missing ({where}{more}); the rows "
+            found=f"{counted(missing, 'frame')} {'is' if missing == 1 else 'are'} missing ({where}); the rows "
             "there are not valid"
             + (f", which spoils {len(spoilt)} of {len(observed.facts)} rounds." if grave else "."),
             advice="Use a faster card or a lower data rate, and copy the take again before shooting it again.",

@@ -1,12 +1,12 @@
 """The facts of one round: what its plates and its surface say of the subject, in a few numbers."""
 
-import functools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
+from psvideo.model.rows.clipping import brightest_channel
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import Round
@@ -154,9 +154,3 @@ def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_],
         return None
     level = max(float(dark.mean(where=subject)), 0.0)
     return level / max(level + float(np.mean(levels)), 1e-9)
-
-
-def brightest_channel(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return every pixel's brightest channel, (row, col)."""
-    # channel by channel: numpy is slow along a short last axis
-    return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from psvideo.clip import Masks
 from psvideo.compute.ranks import quantile
 from psvideo.model.marker import NOT_FIRING
+from psvideo.model.rows.clipping import brightest_channel
 from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.observe.astray import Astray, astray
-from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, brightest_channel, instant_facts, thinned_round
+from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.coarse.seed import MISNAMED_PPM, gain_of
+from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, gain_of
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
@@ -125,7 +125,7 @@ def _excuses(plan: Plan, found: ClipFit) -> int:
     farther off than the plan says, and than a misnamed rate makes it. One is a fault of the take; with both, most
     plans can be made to fit."""
     ppm = abs(found.fit.beat.clock.mean_offset_ppm())
-    return (found.steps > 0) + (ppm > max(plan.clock_range_ppm, MISNAMED_PPM))
+    return (found.steps > 0) + (ppm > max(plan.clock_range_ppm, LEAST_REACH_PPM))
 
 
 def _worth_trying(plan: Plan, meant: Plan, found: ClipFit) -> list[Rival]:

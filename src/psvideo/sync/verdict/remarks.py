@@ -13,7 +13,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import brightnesses, predictions
 
-MISNAMED_PPM = (-1000.0, 999.0)
+OF_MISNAMED_PPM = (-1000.0, 999.0)
 """Clock offsets that a frame rate misnamed by 1.001 leaves: 120 for 119.88, and 119.88 for 120."""
 NEAR_PPM = 150.0
 CHANGED, GROSS = 1e-3, 0.08
@@ -58,7 +58,7 @@ def _clock(plan: Plan, found: ClipFit) -> str:
     ppm = found.fit.beat.clock.mean_offset_ppm()
     start_s = found.rows.frame_start_s
     error_ppm = 2e6 * found.fit.shift_error_s / float(start_s[-1] - start_s[0])
-    near = min(MISNAMED_PPM, key=lambda misnamed: abs(ppm - misnamed))
+    near = min(OF_MISNAMED_PPM, key=lambda misnamed: abs(ppm - misnamed))
     tolerance = plan.clock_range_ppm
     if abs(ppm - near) + error_ppm < NEAR_PPM and (tolerance < abs(near) or plan.clock_tolerance_ppm is None):
         rate = plan.camera.fps

@@ -13,7 +13,7 @@ import numpy as np
 
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.search import search
-from psvideo.sync.rowfit.coarse.seed import MISNAMED_PPM, first_guess, seeded
+from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, first_guess, seeded
 from psvideo.sync.rowfit.profiles import Profiles
 
 SHUTTERS_DEG = (360.0, 270.0, 240.0, 216.0, 180.0, 172.8, 144.0, 120.0, 90.0, 72.0, 60.0, 45.0, 22.5, 11.25)
@@ -148,11 +148,11 @@ def _rough_loss(rival: Rival, rows: Profiles) -> float:
     plan = rival.plan
     guess, known = first_guess(plan), plan.camera.readout_s is not None
     part = _at_rate_of(plan, rows.turned() if guess.upward else rows).binned(ROUGH_ROWS)
-    reach = max(plan.clock_range_ppm, MISNAMED_PPM)
+    reach = max(plan.clock_range_ppm, LEAST_REACH_PPM)
     return search(plan, part, range_ppm=reach, start=guess, readout_known=known)[0].loss
 
 
 def _share(plan: Plan, rows: Profiles) -> float:
     """Return which share of the robust loss the plan takes away at its best place."""
-    reach = max(plan.clock_range_ppm, MISNAMED_PPM)
+    reach = max(plan.clock_range_ppm, LEAST_REACH_PPM)
     return seeded(plan, _at_rate_of(plan, rows), first_guess(plan), reach)[1]

@@ -28,7 +28,7 @@ from psvideo.sync.rowfit.tracking.losses import frame_losses
 SEARCH_ROWS = 36
 SEED_ROWS = 144
 SEED_FRAMES = 48
-MISNAMED_PPM = 1100.0
+LEAST_REACH_PPM = 1100.0
 """The search reaches this far at least, so that a frame rate misnamed by 1.001 is found."""
 GOOD_SEED, FAIR_SEED = 0.7, 0.3
 """A seed that takes away this share of the robust loss is taken at once; one that takes away less calls for a wider
@@ -71,7 +71,7 @@ def renumbered(rows: Profiles, numbering: Numbering) -> Profiles:
 
 def find_seed(plan: Plan, rows: Profiles) -> Seed:
     """Return the best seed that the files' own numbering allows, or that another one makes clearly better."""
-    reach_ppm = max(plan.clock_range_ppm, MISNAMED_PPM)
+    reach_ppm = max(plan.clock_range_ppm, LEAST_REACH_PPM)
     coarse = rows.binned(SEED_ROWS)
     seed = _best(plan, coarse, as_numbered(rows), _stretches(plan, coarse), reach_ppm)
     twin = twins(coarse)
@@ -92,7 +92,7 @@ def other_seeds(plan: Plan, rows: Profiles) -> Iterator[Seed]:
 
     The first comes from many short stretches, as frames may be missing all over, the second from regular numberings.
     """
-    reach_ppm = max(plan.clock_range_ppm, MISNAMED_PPM)
+    reach_ppm = max(plan.clock_range_ppm, LEAST_REACH_PPM)
     coarse = rows.binned(SEED_ROWS)
     runs = [_best(plan, coarse, as_numbered(rows), [run], reach_ppm) for run in _runs(plan, rows)]
     yield max(runs, key=lambda seed: seed.share)
