@@ -18,7 +18,8 @@ Order = Literal["marker", "rig", "given", "guess"]
 
 @dataclass(frozen=True, kw_only=True)
 class Flash(HasLights):
-    """One flash of the clip. ``slot`` is its place in the plan's list; ``complete`` False: the clip cuts it."""
+    """One flash of the clip. ``slot`` is its place in the plan's list; ``complete`` False: the clip cuts it, or it
+    never fired."""
 
     index: int
     slot: int

@@ -27,6 +27,7 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import may_restart
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.turns import turns
+from psvideo.sync.unfired import remarks_on_unfired, without_unfired
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
@@ -118,7 +119,7 @@ def _chapter(part: _Take, strobe: "FoundStrobe") -> Chapter:
 
 def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
     plan, found, beat = take.plan, strobe.found, strobe.found.fit.beat
-    return timing_of_fit(
+    timing = timing_of_fit(
         plan,
         found,
         order=strobe.order,
@@ -131,6 +132,9 @@ def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
             *remarks_on_frames(plan, found, take.indices),
         ),
     )
+    fired = without_unfired(plan, found, timing.flashes)
+    unfired = remarks_on_unfired(found, timing.flashes, fired, take.numbers)
+    return replace(timing, flashes=fired, notes=(*timing.notes, *unfired))
 
 
 def check_first_light(plan: Plan, first_light: str | None) -> None:

@@ -1,0 +1,223 @@
+"""Flashes that never fired: a light that missed its turn, or that died during the clip.
+
+Where a flash is missing, the picture shows at its time what a dark slot shows. Every flash gets a gain of its own on
+what its light gives: rows' brightnesses are fitted under the gains, and the gains under the brightnesses, in turns, so
+that a light that is dead for half of the clip counts as one that gives nothing then, and not as half as bright. A gain
+near none is a missing flash where other lights go on flashing around it; a subject that leaves the picture takes the
+light of all.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.model.rows.shutter import Pulse
+from psvideo.model.timing import Flash
+from psvideo.model.units import counted
+from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.refine import row_noise
+from psvideo.sync.rowfit.row_model import IntArray
+
+ROWS = 60
+PART_FRAMES = 512
+"""Frames over which a light's brightnesses are taken to be the same, but for one gain a flash."""
+TURNS = 4
+TOUCHED = 4
+"""A flash is looked for in so many frames from the first that may see any of it."""
+NONE = 0.2
+"""A flash that gives less than this share of what its light gives elsewhere, as the flashes around it do, has not
+fired."""
+AROUND = 3
+"""Flashes before and after that show whether other lights go on;"""
+GOES_ON = 0.5
+"""they do where they give this share of their own light."""
+SEEN = 0.2
+"""Rows must have seen so much of a flash, as a share of its squared light, to tell whether it fired."""
+SURE = 4.0
+"""Standard errors by which a gain, and usual scatters by which a flash, must lie below what one that fired shows."""
+FAINT = 0.01
+"""A light that gives less than this share of the brightest one is said to give none at all, elsewhere."""
+LEAST_FIRED = 3
+"""Flashes of a light that fired, from which on it is known how much they scatter."""
+MOST_NAMED = 8
+"""Frames that a sentence names."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Levels:
+    """What flashes give, ``value`` (flash,), with its standard errors; NaN where too little was seen of one."""
+
+    value: FloatArray
+    error: FloatArray
+
+
+def without_unfired(plan: Plan, found: ClipFit, flashes: Sequence[Flash]) -> tuple[Flash, ...]:
+    """Return a clip's flashes, in order, with those marked as incomplete that give no light where others go on.
+    ``found`` is the fit under the lights' names."""
+    lit = [flash for flash in flashes if not flash.is_dark]
+    if not lit:
+        return tuple(flashes)
+    dead = {flash.index for flash, off in zip(lit, _unfired(plan, found, lit), strict=True) if off}
+    return tuple(replace(one, complete=one.complete and one.index not in dead) for one in flashes)
+
+
+def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> NDArray[np.bool_]:
+    """Return which of the lit flashes never fired, shape (flash,)."""
+    slot = np.array([flash.slot for flash in lit])
+    levels = _levels(plan, found, lit)
+    share, error = np.full(len(lit), np.nan), np.full(len(lit), np.inf)
+    usual = {one: _usual(levels.value[slot == one]) for one in plan.lit_slots}
+    for one, level in usual.items():
+        if level > FAINT * max(usual.values()):
+            share[slot == one] = levels.value[slot == one] / level
+            error[slot == one] = levels.error[slot == one] / level
+    around = _around(share, slot)
+    share, error = share / around, error / around
+    off = (share < NONE) & (around > GOES_ON) & (share + SURE * error < GOES_ON)
+    for one in plan.lit_slots:
+        fired = share[(slot == one) & (share > GOES_ON)]
+        scatter = 1.4826 * float(np.median(np.abs(fired - np.median(fired)))) if len(fired) >= LEAST_FIRED else np.inf
+        off &= (slot != one) | (1 - share > SURE * scatter)
+    return off
+
+
+def _usual(level: FloatArray) -> float:
+    """Return what a light's flashes give that fire, most of which may be missing."""
+    known = level[np.isfinite(level)]
+    if not len(known):
+        return 0.0
+    return float(np.median(known[known >= GOES_ON * np.percentile(known, 95)], keepdims=True)[0])
+
+
+def _around(share: FloatArray, slot: IntArray) -> FloatArray:
+    """Return what flashes of other lights give just before and after each one, shape (flash,)."""
+    beside = [n for n in range(-AROUND, AROUND + 1) if n]
+    at = np.arange(len(share))[:, None] + np.array(beside)
+    inside = (at >= 0) & (at < len(share))
+    at = np.clip(at, 0, len(share) - 1)
+    others = inside & np.isfinite(share[at])
+    if len(np.unique(slot)) > 1:
+        others &= slot[at] != slot[:, None]
+    near = np.where(others, share[at], np.nan)
+    near[~others.any(axis=1)] = 0.0
+    found: FloatArray = np.maximum(np.nanmedian(near, axis=1), 1e-9)
+    return found
+
+
+def _first_frame(found: ClipFit, start_s: FloatArray) -> IntArray:
+    """Return the first place in time of which any row sees any of each flash, shape (flash,)."""
+    beat, rows = found.fit.beat, found.rows
+    spread_s = rows.place.max() * beat.row_time_s + beat.exposure_s
+    first: IntArray = np.floor((start_s - spread_s) / rows.period_s).astype(np.int64) + 1
+    return first
+
+
+def _levels(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> _Levels:
+    """Return what every lit flash gives, with brightnesses that are fitted part by part."""
+    rows = replace(found.rows.one_window(), doubt=None, restless=None).binned(ROWS)
+    start_s, duration_s = (np.array([getattr(one, name) for one in lit]) for name in ("start_s", "duration_s"))
+    number = {slot: n for n, slot in enumerate(plan.lit_slots)}
+    unknown = np.array([number[one.slot] for one in lit])
+    first = _first_frame(found, start_s)
+    value, error = np.full(len(lit), np.nan), np.full(len(lit), np.inf)
+    parts = max(round(len(rows.value) / PART_FRAMES), 1)
+    edges = np.linspace(0, len(rows.value), parts + 1).astype(int)
+    for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        span = slice(begin, min(end + TOUCHED, len(rows.value)))
+        own = np.flatnonzero((first <= rows.index[end - 1]) & (first + TOUCHED > rows.index[begin]))
+        if not len(own):
+            continue
+        part = _Part.of(found, rows.take(span), first[own], start_s[own], duration_s[own], unknown[own])
+        level, unsure = part.levels(len(plan.lit_slots))
+        here = (first[own] >= rows.index[begin]) | (begin == 0)
+        value[own[here]], error[own[here]] = level[here], unsure[here]
+    return _Levels(value=value, error=error)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    """Frames ``value`` (frame, row) and the flashes in them: of each its light ``unknown`` (flash,), the frames ``at``
+    (flash, touched) that may have seen it, and what share of it their rows saw, ``seen`` (flash, touched, row)."""
+
+    value: FloatArray
+    at: IntArray
+    seen: FloatArray
+    unknown: IntArray
+
+    @classmethod
+    def of(
+        cls,
+        found: ClipFit,
+        rows: Profiles,
+        first: IntArray,
+        start_s: FloatArray,
+        duration_s: FloatArray,
+        unknown: IntArray,
+    ) -> "_Part":
+        """Lay out flashes that start and last for some seconds, each first seen in a frame at a place in time."""
+        beat = found.fit.beat
+        places = first[:, None] + np.arange(TOUCHED)
+        at = np.minimum(np.searchsorted(rows.index, places), len(rows.index) - 1)
+        since_s = places[:, :, None] * rows.period_s + rows.place * beat.row_time_s - start_s[:, None, None]
+        pulse, lasts_s = Pulse(rise_s=beat.rise_s, fall_s=beat.fall_s), duration_s[:, None, None]
+        seen = pulse.given_off(since_s + beat.exposure_s, lasts_s) - pulse.given_off(since_s, lasts_s)
+        seen *= (rows.index[at] == places)[:, :, None]
+        return cls(value=rows.value, at=at, seen=seen, unknown=unknown)
+
+    def levels(self, lights: int) -> tuple[FloatArray, FloatArray]:
+        """Return what every flash gives, as a mean over rows, and its standard error, both of shape (flash,)."""
+        gain = np.ones(len(self.unknown))
+        for turn in range(TURNS):
+            design = self._design(gain, lights)
+            light = _solved(design, self.value)
+            rest = self.value - np.einsum("fru,ru->fr", design, light)
+            own = self.seen * light[:, 1:].T[self.unknown][:, None, :]
+            power = (own**2).sum(axis=(1, 2))
+            move = (own * rest[self.at]).sum(axis=(1, 2)) / np.maximum(power, 1e-30)
+            gain = np.clip(gain + move * (1.0 if turn == 0 else 0.7), -1.0, 9.0)
+        size = np.sqrt((light[:, 1:] ** 2).mean(axis=0))[self.unknown]
+        whole = (light[:, 1:] ** 2).sum(axis=0)[self.unknown]
+        noise = np.sqrt((own**2 * row_noise(rest) ** 2).sum(axis=(1, 2))) / np.maximum(power, 1e-30)
+        level: FloatArray = np.where(power > SEEN * whole, gain * size, np.nan)
+        return level, noise * size
+
+    def _design(self, gain: FloatArray, lights: int) -> FloatArray:
+        """Return what rows saw of ambient light and of every light, shape (frame, row, 1 + light)."""
+        design = np.zeros((*self.value.shape, 1 + lights))
+        design[:, :, 0] = 1.0
+        share = gain[:, None, None] * self.seen
+        np.add.at(design.transpose(0, 2, 1), (self.at, 1 + self.unknown[:, None]), share)
+        return design
+
+
+def _solved(design: FloatArray, value: FloatArray) -> FloatArray:
+    """Return the brightnesses (row, unknown) that explain rows best."""
+    normal = np.einsum("fru,frv->ruv", design, design, optimize=True)
+    size = np.einsum("ruu->ru", normal)
+    normal += 1e-6 * np.maximum(size, size.max())[:, :, None] * np.eye(design.shape[2])
+    right = np.einsum("fru,fr->ru", design, value, optimize=True)
+    found: FloatArray = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+    return found
+
+
+def remarks_on_unfired(
+    found: ClipFit, flashes: Sequence[Flash], fired: Sequence[Flash], numbers: NDArray[np.int64]
+) -> Iterator[str]:
+    """Say which of a clip's complete ``flashes`` are not among those that ``fired``, by the frames' ``numbers``."""
+    lost = [one for one, other in zip(flashes, fired, strict=True) if one.complete and not other.complete]
+    for lit in dict.fromkeys(flash.lit for flash in lost):
+        own = [flash for flash in lost if flash.lit == lit]
+        first = _first_frame(found, np.array([flash.start_s for flash in own]))
+        frames = numbers[np.clip(np.searchsorted(found.track.index, first), 0, len(numbers) - 1)].tolist()
+        last_s = max((flash.start_s for flash in fired if flash.lit == lit and flash.complete), default=-np.inf)
+        shown = ", ".join(str(number) for number in frames[:MOST_NAMED]) + (" …" if len(frames) > MOST_NAMED else "")
+        where = f"none after frame {frames[0]}" if len(own) > 1 and last_s < own[0].start_s else f"in frames {shown}"
+        yield (
+            f"{'+'.join(lit)}: {counted(len(own), 'flash')} never fired ({where}), where the other lights went on. "
+            "They are marked as incomplete and give no plate: check this light, its wiring and its power."
+        )

@@ -1,0 +1,83 @@
+"""A flash that never fired, and a light that dies during the clip: named, incomplete, and no plate."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.sync.find import find_timing
+from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
+
+PlanMaker = Callable[..., Plan]
+FRAMES = 140
+
+
+@pytest.fixture
+def plan(make_plan: PlanMaker) -> Plan:
+    return make_plan(height_px=48, width_px=12)
+
+
+def shot_of(plan: Plan, dead: Callable[[TrueFlash], bool], *, fade: float = 1.0) -> Exposure:
+    """Expose a scene to which some flashes give no light; at the end all give a share ``fade`` of what they gave."""
+    rng = np.random.default_rng(5)
+    plates = {slot: (0.2 + 0.5 * rng.random((48, 12))).astype(np.float32) for slot in plan.lit_slots}
+
+    def plate_of(flash: TrueFlash) -> NDArray[np.float32]:
+        share = 1.0 + (fade - 1.0) * flash.start_s / (FRAMES * plan.camera.frame_period_s)
+        lit = flash.slot in plates and not dead(flash)
+        return plates[flash.slot] * np.float32(share) if lit else np.zeros((48, 12), np.float32)
+
+    clock = TrueClock(phase_s=0.0123, offset_ppm=80.0)
+    return expose(plate_of, plan, frames=FRAMES, clock=clock, ambient=0.02, noise=Noise(full_well_e=2e4, read_e=5))
+
+
+def timing_of(plan: Plan, shot: Exposure) -> Timing:
+    return find_timing(plan, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
+
+
+def inside(plan: Plan, shot: Exposure) -> list[TrueFlash]:
+    """Return the lit flashes well within the clip."""
+    period_s = plan.camera.frame_period_s
+    return [one for one in shot.flashes if one.lights and 3 * period_s < one.start_s < (FRAMES - 4) * period_s]
+
+
+def held_against(plan: Plan, shot: Exposure, timing: Timing) -> list[bool]:
+    """Return of every such flash whether it is listed as complete; times and lights must be right."""
+    listed = []
+    for true in inside(plan, shot):
+        near = min(timing.flashes, key=lambda one: abs(one.start_s - true.start_s))
+        assert abs(near.start_s - true.start_s) < 0.05 * plan.camera.row_time_s
+        assert near.slot == true.slot
+        listed.append(near.complete)
+    return listed
+
+
+@pytest.mark.parametrize("skipped", [(40,), (60, 62), (30, 70, 97)])
+def test_flashes_that_never_fired_are_named_and_incomplete(skipped: tuple[int, ...], plan: Plan) -> None:
+    shot = shot_of(plan, lambda flash: flash.index in skipped)
+    timing = timing_of(plan, shot)
+    assert held_against(plan, shot, timing) == [flash.index not in skipped for flash in inside(plan, shot)]
+    dark = {flash.lit[0] for flash in shot.flashes if flash.index in skipped and flash.lit}
+    assert {note.split(":")[0] for note in timing.notes if "never fired" in note} == dark
+    assert timing.dropped_frames == ()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.85])
+def test_a_light_that_dies_is_named_from_when_it_does(share: float, plan: Plan) -> None:
+    slot, from_s = plan.lit_slots[1], share * FRAMES * plan.camera.frame_period_s
+    shot = shot_of(plan, lambda flash: flash.slot == slot and flash.start_s > from_s)
+    timing = timing_of(plan, shot)
+    fired = [flash.slot != slot or flash.start_s <= from_s for flash in inside(plan, shot)]
+    assert held_against(plan, shot, timing) == fired
+    [note] = [note for note in timing.notes if "never fired" in note]
+    assert note.startswith(plan.flashes[slot].lit[0])
+
+
+def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(plan: Plan) -> None:
+    shot = shot_of(plan, lambda _: False, fade=0.02)
+    timing = timing_of(plan, shot)
+    assert all(held_against(plan, shot, timing))
+    assert not any("never fired" in note for note in timing.notes)
