@@ -20,6 +20,7 @@ from PIL import Image, ImageCms
 
 from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode, opened, read_header
+from psvideo.clip.decode.exr import read_halves
 from psvideo.clip.decode.exr_chunks import is_cut_short
 from psvideo.clip.record import PictureInFile
 from psvideo.errors import PsvideoError
@@ -166,6 +167,30 @@ def test_exr_of_several_layers_or_none_is_refused(tmp_path: Path) -> None:
     OpenEXR.File({}, {"Z": planes["a.Y"]}).write(str(tmp_path / "depth.exr"))
     with pytest.raises(PsvideoError, match="neither Y nor R, G, B"):
         read_header("exr", tmp_path / "depth.exr")
+
+
+def write_parts(path: Path, **parts: dict[str, NDArray[np.floating]]) -> Path:
+    OpenEXR.File([OpenEXR.Part({}, dict(planes), name) for name, planes in parts.items()]).write(str(path))
+    return path
+
+
+def test_an_exr_s_picture_is_found_in_a_later_part_where_the_first_shows_none(tmp_path: Path) -> None:
+    depth = {"Z": np.full((4, 5), 7, np.float32)}
+    low, high = (random(16, 3)[:4, :5].astype(np.float32) / 65535 for _ in range(2))
+    in_layer = {f"rgba.{name}": np.ascontiguousarray(low[..., place]) for place, name in enumerate("RGB")}
+    first = {name: np.ascontiguousarray(high[..., place]) for place, name in enumerate("RGB")}
+    later = write_parts(tmp_path / "later.exr", depth=depth, rgba=in_layer)
+    assert read_header("exr", later).channels == 3
+    assert np.array_equal(decode("exr", later).codes, low)
+    assert np.array_equal(np.stack(read_halves(later).planes, axis=-1), low)
+    both = write_parts(tmp_path / "both.exr", beauty=first, rgba=in_layer)
+    assert np.array_equal(decode("exr", both).codes, high), "the first part goes before the others"
+    two = write_parts(tmp_path / "two.exr", depth=depth, beauty=first, rgba=in_layer)
+    with pytest.raises(PsvideoError, match=r"more than one picture \(channels B, G, R, Z, rgba\.B"):
+        decode("exr", two)
+    none = write_parts(tmp_path / "none.exr", depth=depth, far={"far.Z": depth["Z"]})
+    with pytest.raises(PsvideoError, match=r"neither Y nor R, G, B \(channels Z, far\.Z\)"):
+        read_header("exr", none)
 
 
 def test_exr_data_window_is_put_in_its_place_in_the_display_window(tmp_path: Path) -> None:

@@ -190,6 +190,14 @@ def test_depth_that_cannot_be_meant_is_refused_in_a_paragraph(
     assert str(path) in str(caught.value)
 
 
+def test_depth_in_a_later_part_goes_before_the_colours_of_the_first(tmp_path: Path) -> None:
+    colour = {name: np.full((ROWS, COLS), 0.5, np.float32) for name in "RGB"}
+    parts = [OpenEXR.Part({}, colour, "beauty"), OpenEXR.Part({}, {"depth.Z": true_depth()}, "depth")]
+    OpenEXR.File(parts).write(str(tmp_path / "scan.exr"))
+    found = open_depth(tmp_path / "scan.exr", width_px=COLS, height_px=ROWS).first
+    assert np.array_equal(found, true_depth())
+
+
 def test_other_files_are_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "eight.png"), np.full((ROWS, COLS), 100, np.uint8))
     (tmp_path / "text.exr").write_text("no picture")

@@ -1,6 +1,7 @@
 """OpenEXR: half or float, grey (Y) or R, G, B, read as they are: EXR holds linear light.
 
-Channels may stand in a layer (``key.R``); an alpha channel is left out. A picture whose data window is narrower than
+Channels may stand in a layer (``key.R``), or in a later part of a file whose first part shows none, as renderers and
+compositors write them; an alpha channel is left out. A picture whose data window is narrower than
 its display window is put in its place with 0 around it.
 """
 
@@ -23,6 +24,8 @@ from psvideo.formats.paths import check_file
 
 GREY_NAMES = ("Y", "L", "V")
 LUMINANCE = "the EXR files hold colour as differences (RY, BY), which are left out: they are read as grey (Y)"
+Choose = Callable[[list[list[str]]], tuple[int, tuple[str, ...]]]
+"""Takes the channels' names of every part, and returns a part's index and one or three of its names."""
 OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWindowWidth")
 
 
@@ -31,10 +34,10 @@ def header(path: Path) -> Header:
     return header_of(path, partial(_picture_channels, path))
 
 
-def header_of(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> Header:
+def header_of(path: Path, choose: Choose) -> Header:
     """Read what the file says of the channels that ``choose`` takes, without decoding its pixels."""
     with _open(path, header_only=True) as file:
-        return _header(file, choose(_names(file)))
+        return _header(file, *choose(_names(file)))
 
 
 def decode(path: Path) -> CodedPicture:
@@ -42,15 +45,15 @@ def decode(path: Path) -> CodedPicture:
     return decode_channels(path, partial(_picture_channels, path))
 
 
-def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> CodedPicture:
+def decode_channels(path: Path, choose: Choose) -> CodedPicture:
     """Decode the channels that ``choose`` takes from the names of all, one or three: half floats, where all are."""
     header_of(path, choose)
     with _open(path, header_only=False) as file:
-        names = choose(_names(file))
-        channels = file.channels()
+        part, names = choose(_names(file))
+        channels = file.channels(part)
         planes = [channels[name].pixels for name in names]
-        head = _header(file, names)
-        return CodedPicture(header=head, codes=_in_display_window(_side_by_side(planes), file.header(), head))
+        head = _header(file, part, names)
+        return CodedPicture(header=head, codes=_in_display_window(_side_by_side(planes), file.header(part), head))
 
 
 def _side_by_side(planes: list[NDArray[Any]]) -> NDArray[Any]:
@@ -79,10 +82,10 @@ def read_halves(path: Path) -> Stored:
     What lies outside the data window is 0. Raises PsvideoError where the file is damaged or holds no one picture.
     """
     with _open(path, header_only=False) as file:
-        names = _picture_channels(path, _names(file))
-        channels, head = file.channels(), _header(file, names)
-        planes = tuple(_in_display_window(channels[name].pixels, file.header(), head) for name in names)
-        return Stored(planes=planes, attributes=_lines(dict(file.header())))
+        part, names = _picture_channels(path, _names(file))
+        channels, head = file.channels(part), _header(file, part, names)
+        planes = tuple(_in_display_window(channels[name].pixels, file.header(part), head) for name in names)
+        return Stored(planes=planes, attributes=_lines(dict(file.header(part))))
 
 
 def contents(path: Path, *, header_only: bool = True) -> tuple[list[str], dict[str, str | int | float | None]]:
@@ -144,21 +147,27 @@ def _open(path: Path, *, header_only: bool) -> Any:
     return file
 
 
-def _names(file: Any) -> list[str]:
-    return [channel.name for channel in file.header()["channels"]]
+def _names(file: Any) -> list[list[str]]:
+    return [[channel.name for channel in part.header["channels"]] for part in file.parts]
 
 
-def _picture_channels(path: Path, found: list[str]) -> tuple[str, ...]:
-    """Find the channels that hold the picture: Y alone, or R, G and B, at the top level or in one layer."""
+def _picture_channels(path: Path, parts: list[list[str]]) -> tuple[int, tuple[str, ...]]:
+    """Find the picture: Y alone, or R, G and B, at the top level or in one layer, in the first part if it shows one."""
+    pictures = [(part, names) for part, found in enumerate(parts) for names in _pictures_in(found)]
+    nearest = [picture for picture in pictures if picture[0] == 0] or pictures
+    if len(nearest) == 1:
+        return nearest[0]
+    found = parts[0] if nearest and nearest[0][0] == 0 else [name for part in parts for name in part]
+    several = f"more than one {'layer' if found is parts[0] else 'picture'}" if nearest else "neither Y nor R, G, B"
+    raise PsvideoError(
+        f"{path}: holds {several} (channels {', '.join(sorted(found))}); expected one picture, in the channels "
+        "R, G, B or in Y. Write such a file from the layer that is meant."
+    )
+
+
+def _pictures_in(found: list[str]) -> list[tuple[str, ...]]:
     layers = {name.rpartition(".")[0]: None for name in found}
-    pictures = [names for layer in layers if (names := _picture_in(layer, found))]
-    if len(pictures) != 1:
-        several = "more than one layer" if pictures else "neither Y nor R, G, B"
-        raise PsvideoError(
-            f"{path}: holds {several} (channels {', '.join(sorted(found))}); expected one picture, in the channels "
-            "R, G, B or in Y. Write such a file from the layer that is meant."
-        )
-    return pictures[0]
+    return [names for layer in layers if (names := _picture_in(layer, found))]
 
 
 def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
@@ -169,8 +178,8 @@ def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
     return next(((prefix + name,) for name in GREY_NAMES if prefix + name in found), ())
 
 
-def _header(file: Any, names: tuple[str, ...]) -> Header:
-    attributes = file.header()
+def _header(file: Any, part: int, names: tuple[str, ...]) -> Header:
+    attributes = file.header(part)
     width_px, height_px = _size(attributes["displayWindow"])
     kinds = {channel.name.rpartition(".")[2] for channel in attributes["channels"]}
     alpha = ("the EXR files' alpha channel is left out",) if "A" in kinds else ()

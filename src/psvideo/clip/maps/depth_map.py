@@ -128,18 +128,25 @@ def _decode_exr(path: Path) -> NDArray[np.floating]:
     return grey
 
 
-def _depth_channel(path: Path, found: list[str]) -> tuple[str, ...]:
+def _depth_channel(path: Path, parts: list[list[str]]) -> tuple[int, tuple[str, ...]]:
     """Choose Z before Y and their like, but no Z that is one of the three numbers of a position or a normal."""
-    vectors = {name.rpartition(".")[0] for name in found if name.rpartition(".")[2].upper() == "X"}
-    free = [name for name in found if name.rpartition(".")[0] not in vectors]
+    free = [(part, name) for part, found in enumerate(parts) for name in _lone(found)]
     for wanted in DEPTH_NAMES:
-        these = [name for name in free if name.rpartition(".")[2].lower() == wanted.lower()]
+        these = [(part, name) for part, name in free if name.rpartition(".")[2].lower() == wanted.lower()]
         if len(these) == 1:
-            siblings = tuple(f"{these[0][:-1]}{other}" for other in "RGB")
-            return siblings if wanted == "R" and set(siblings) <= set(found) else (these[0],)
+            part, name = these[0]
+            siblings = tuple(f"{name[:-1]}{other}" for other in "RGB")
+            return part, siblings if wanted == "R" and set(siblings) <= set(parts[part]) else (name,)
         if these:
             break
+    found = ", ".join(sorted(name for part in parts for name in part))
     raise PsvideoError(
-        f"{path}: it is not clear which channel is depth (channels {', '.join(sorted(found))}). Expected one named Z, "
+        f"{path}: it is not clear which channel is depth (channels {found}). Expected one named Z, "
         "or a picture of one channel. Write such a file from the layer that is meant."
     )
+
+
+def _lone(found: list[str]) -> list[str]:
+    """Return the names that are of no vector."""
+    vectors = {name.rpartition(".")[0] for name in found if name.rpartition(".")[2].upper() == "X"}
+    return [name for name in found if name.rpartition(".")[0] not in vectors]
