@@ -78,6 +78,16 @@ def test_of_noise_alone_two_thirds_are_within_the_predicted_error(lights: int) -
     assert np.median(predicted) < 2.2 * np.median(errors)
 
 
+@pytest.mark.parametrize("lights", [5, 8])
+def test_codes_that_lie_low_in_their_files_are_as_good_as_others(lights: int) -> None:
+    """Twelve bits in files of sixteen, of which the plan says nothing: all is a sixteenth, noise included."""
+    usual, errors, predicted = judged(ring(lights, 30), noise=0.001)
+    low, low_errors, low_predicted = judged(ring(lights, 30), noise=0.001 / 16, colour=COLOUR / 16)
+    assert np.median(low_errors) == pytest.approx(np.median(errors), rel=0.1)
+    assert np.median(low_predicted) < 2.2 * np.median(predicted)
+    assert low.valid.sum() > 0.99 * usual.valid.sum()
+
+
 @pytest.mark.parametrize("lights", [3, 4])
 def test_noise_is_as_well_predicted_on_a_red_surface_whose_other_channels_hardly_count(lights: int) -> None:
     red = np.array([0.6, 0.06, 0.04])

@@ -117,6 +117,14 @@ def test_plates_of_nothing_have_the_least_noise() -> None:
     assert noise_of(dark, LIT).at(0.4) == pytest.approx(0.0003)
 
 
+@pytest.mark.parametrize("lit", [LIT, None], ids=["lights known", "no lights"])
+def test_a_picture_that_is_dark_as_a_whole_may_be_less_noisy_than_cameras_are(lit: Illumination | None) -> None:
+    plates = (waves(0.8) + np.random.default_rng(3).normal(0, 0.0015, (4, 128, 128))).astype(np.float32)
+    usual, low = noise_of(list(plates), lit), noise_of(list(plates / 16), lit)
+    assert low.at(0.4 / 16) == pytest.approx(usual.at(0.4) / 16, rel=0.1)
+    assert usual.least == 0.0003 > 2 * low.least
+
+
 def test_rounding_is_found_in_what_lights_leave_over_as_well() -> None:
     true = waves(0.8) * grain(1)
     plates = (np.round(255 * true) / 255).astype(np.float32)

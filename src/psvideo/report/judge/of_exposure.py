@@ -49,7 +49,8 @@ def exposure(observed: Observed) -> Iterator[Judgement]:
             grade="bad" if top < DARK_STOPS else "doubtful",
             found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
             "saturation, so noise is large.",
-            advice=f"Open the aperture by about {_half(BEST_STOPS - top)}, or flash longer or stronger.",
+            advice=f"Open the aperture by about {_half(BEST_STOPS - top)}, or flash longer or stronger. Where files "
+            "hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead.",
         )
     elif not clipped:
         yield Judgement(

@@ -1,7 +1,7 @@
 """How noisy plates are, from the plates themselves: what their finest detail says where the picture has least of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ Values = NDArray[np.float64]
 
 LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""
+WELL_LIT = 0.25
+"""... of a picture whose brightest parts reach this. A darker one is as much less noisy at least: twelve bits that lie
+low in files of sixteen never come near what their files can hold, and are as good as elsewhere."""
 ROWS, SAMPLES = 24, 1 << 16
 """Noise is looked for in about this many rows of every plate, evenly spread, and this many samples of all: of small
 pictures in more rows."""
@@ -31,10 +34,20 @@ quarter's border as a share of the mean, for one Gaussian number (chi squared)."
 
 @dataclass(frozen=True, kw_only=True)
 class PlateNoise:
-    """The variance of a plate's sample at a level (1.0 = saturation): read + photon * level."""
+    """The variance of a plate's sample at a level (1.0 = saturation): read + photon * level.
+
+    dimness: what the least noises that cameras are believed to have are multiplied by, less than 1 where the picture
+    is dark as a whole.
+    """
 
     read: float
     photon: float
+    dimness: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """The least standard deviation that is believed of such a picture."""
+        return LEAST * self.dimness
 
     @property
     def dark(self) -> float:
@@ -102,10 +115,11 @@ def _line(at: Values, found: Values) -> PlateNoise:
     bright, darkest = at > BRIGHT * at.max(), int(np.argmin(at))
     if at.max() <= 0:  # no light anywhere
         return PlateNoise(read=max(float(found[darkest]), LEAST**2), photon=0.0)
+    dimness = min(float(at.max()) / WELL_LIT, 1.0)
     rise = (found - found[darkest]) / np.maximum(at - at[darkest], 1e-6)
     photon = max(median(rise[bright]), 0.0)
-    read = max(float(found[darkest]) - photon * max(float(at[darkest]), 0.0), LEAST**2)
-    return PlateNoise(read=read, photon=photon)
+    read = max(float(found[darkest]) - photon * max(float(at[darkest]), 0.0), (LEAST * dimness) ** 2)
+    return PlateNoise(read=read, photon=photon, dimness=dimness)
 
 
 def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) -> PlateNoise:
@@ -125,7 +139,8 @@ def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) 
     left = min(alone.read, max(_line(at, found).read, share * alone.read))
     read = left + (alone.read - left) * dark_share
     photon = median(np.maximum(found[bright] - left, 0) / at[bright])
-    return PlateNoise(read=read, photon=min(photon, max(alone.at(level) ** 2 - read, 0.0) / level))
+    photon = min(photon, max(alone.at(level) ** 2 - read, 0.0) / level)
+    return replace(alone, read=read, photon=photon)
 
 
 def _fine(

@@ -13,7 +13,7 @@ from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
-from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
+from psvideo.solve.normals.plate_noise import PlateNoise, noise_of
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
@@ -149,7 +149,7 @@ class Solving:
 
 def _usable(noise: PlateNoise, channels: int, method: Method) -> Usable:
     """Return which measurements count: those that stand out of noise, and what else the method leaves out."""
-    dark = CERTAIN * max(noise.dark / np.sqrt(channels), LEAST)
+    dark = CERTAIN * max(noise.dark / np.sqrt(channels), noise.least)
     return Usable(dark_level=float(dark), shadow_ratio=INDIRECT if method == "robust" else 0.0)
 
 

@@ -34,7 +34,7 @@ BESIDE = np.ones((3, 3), np.uint8)
 def soft_matte(rows: PlateRows, noise: PlateNoise, *, mask: Mask | None = None) -> Floats:
     """Return how much of each pixel the subject covers, (row, col), 0 to 1; ``mask`` is where it may be."""
     channels = 1 if len(rows.shape) == 2 else rows.shape[2]
-    level = CERTAIN * max(noise.dark / float(np.sqrt(channels)), LEAST)
+    level = CERTAIN * max(noise.dark / float(np.sqrt(channels)), noise.least)
     most = np.zeros(rows.shape[:2], np.float32)
 
     def brightest(first: int, last: int) -> None:

@@ -14,7 +14,7 @@ from psvideo.model.irradiance.ground import every_ray
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.plate_noise import LEAST, PlateNoise
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.solving import CERTAIN, INDIRECT
 from psvideo.solve.normals.task import Mask
 from psvideo.solve.passes.plate_rows import PlateRows
@@ -37,7 +37,7 @@ class Explaining:
     @property
     def dark(self) -> float:
         """The mean over channels from which on a pixel is certain to be lit."""
-        return CERTAIN * max(self.noise.dark / float(np.sqrt(self.lit.intensities.shape[1])), LEAST)
+        return CERTAIN * max(self.noise.dark / float(np.sqrt(self.lit.intensities.shape[1])), self.noise.least)
 
     def expected(self, light: int, first: int, last: int) -> Floats:
         """Return what the model says of a light's rows, (row, col, channel)."""

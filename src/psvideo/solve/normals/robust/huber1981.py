@@ -94,6 +94,8 @@ def solve(
         threads=threads,
     )
     noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
+    if plate_noise is not None:
+        reweighting = replace(reweighting, noise=reweighting.noise * plate_noise.dimness)
     if misfit is None:
         found, misfit, step = _first_look(solution, reweighting, noise)
         if misfit is not None:

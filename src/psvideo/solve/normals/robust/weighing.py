@@ -23,7 +23,7 @@ class Reweighting:
     width: the residual, over the pixel's own median residual as a standard deviation, where Cauchy's weight is a half
         and Tukey's becomes 0 at that times ``TUKEY_WIDTH``; narrower with the root of their number where more than nine
         measurements are usable.
-    noise: in units of sensor saturation.
+    noise: in units of sensor saturation, of a picture that is well lit (``WELL_LIT``).
     signal_noise: as a share of the pixel's albedo under one light, as lights and lenses are never known better.
     darkest, brightest: the shares of the measurements that the start leaves out.
     contradiction: four measurements contradict each other beyond this many times the noise.
