@@ -4,7 +4,7 @@ import os
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -169,7 +169,7 @@ def test_exr_of_several_layers_or_none_is_refused(tmp_path: Path) -> None:
         read_header("exr", tmp_path / "depth.exr")
 
 
-def write_parts(path: Path, **parts: dict[str, NDArray[np.floating]]) -> Path:
+def write_parts(path: Path, **parts: Mapping[str, NDArray[Any]]) -> Path:
     OpenEXR.File([OpenEXR.Part({}, dict(planes), name) for name, planes in parts.items()]).write(str(path))
     return path
 
