@@ -9,21 +9,17 @@ from psvideo.cli.commands.sync import describe_timing
 from psvideo.cli.console import Voice, plain, print_report, print_takes
 from psvideo.cli.options.clip_and_run import (
     ClipPaths,
-    FirstLight,
+    ClipWords,
     Force,
-    Frames,
     OrderRig,
-    PlanPath,
     Resume,
     Sharing,
     StartNumber,
     TimingPath,
 )
-from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesPreviewOption, Weights, WithAmbient
-from psvideo.cli.options.per_light import parse_weights
+from psvideo.cli.options.delivery import BeautyWords, CodecOption, CompressionOption, PlatesPreviewOption
 from psvideo.cli.options.records import spread
-from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
-from psvideo.cli.options.typed import parse_instants
+from psvideo.cli.options.solving import InstantWords
 from psvideo.model.choices import USUAL_COMPRESSION, SplitMethod
 from psvideo.model.units import counted
 
@@ -34,21 +30,16 @@ def split(
     clips: ClipPaths,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder of plates to write.")],
     *,
-    plan: PlanPath = None,
+    words: ClipWords,
     timing: TimingPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
     rig: OrderRig = None,
     method: Annotated[
         SplitMethod, typer.Option(help="weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
     ] = "weights",
     flashes: Annotated[bool, typer.Option("--flashes", help="Also write a plate of every single flash.")] = False,
     beauty: Annotated[bool, typer.Option("--beauty", help="Also write the sum of all lights.")] = False,
-    with_ambient: WithAmbient = False,
-    weight: Weights = None,
-    fps: FpsOption = "round",
-    shutter: ShutterOption = None,
-    resync: ResyncOption = None,
+    mix: BeautyWords,
+    instants: InstantWords,
     preview: PlatesPreviewOption = None,
     preview_codec: CodecOption = "both",
     compression: CompressionOption = USUAL_COMPRESSION,
@@ -63,24 +54,19 @@ def split(
     from psvideo.runs.many_takes.split_of_takes import split_of_takes
     from psvideo.runs.split import split as rebuild
 
-    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
-        plan=plan,
+    options: dict[str, Any] = dict(
         timing=timing,
-        frames=frames,
-        first_light=first_light,
         rig=rig,
         method=method,
         flashes=flashes,
         beauty=beauty,
-        with_ambient=with_ambient,
-        weight=parse_weights(weight),
-        fps=parse_instants(fps),
-        shutter=shutter,
-        resync=resync,
         preview=plain(preview),
         preview_codec=preview_codec,
         compression=compression,
         start_number=start_number,
+        **vars(words),
+        **mix.parameters(),
+        **instants.parameters(),
     )
     common: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
     if len(clips) > 1 or sharing.asked:
@@ -91,5 +77,5 @@ def split(
     voice.say(describe_timing(report.timing))
     print_report(voice, report)
     plates = sum(flash.plate is not None for flash in report.timing.flashes)
-    made = counted(plates, "plate") if fps == "round" else counted(len(report.instants), "instant")
+    made = counted(plates, "plate") if instants.fps == "round" else counted(len(report.instants), "instant")
     voice.say(f"{out}: {made} written; see {out / 'report.html'}.")

@@ -6,12 +6,11 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice, plain, print_report
-from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
+from psvideo.cli.options.calibrate import SphereWords, Transfer
 from psvideo.cli.options.clip_and_run import Force
 from psvideo.cli.options.delivery import AovOption, EncodeOption, MeshOption, Plates, ProgramOption
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.solving import Fill, SolverOption
-from psvideo.cli.options.typed import parse_circle, parse_radius_mm
 
 
 @spread
@@ -31,19 +30,14 @@ def stills(
             "picture by picture; again for a ball at another place."
         ),
     ] = None,
-    spheres: Spheres = 1,
+    seen: SphereWords,
     dark: Annotated[
-        Path | None, typer.Option(help="A picture with every light off. [default: one named dark or ambient]")
+        Path | None, typer.Option(help="A picture with every light off; left out: one named dark or ambient.")
     ] = None,
     mask: Annotated[
-        Path | None, typer.Option("--mask", help="A picture, white where to solve. [default: one named mask]")
+        Path | None, typer.Option("--mask", help="A picture, white where to solve; left out: one named mask.")
     ] = None,
     transfer: Transfer = None,
-    focal_px: FocalPx = None,
-    focal_mm: FocalMm = None,
-    sensor_mm: SensorMm = None,
-    radius_mm: RadiusMm = None,
-    circle: Circles = None,
     solver: SolverOption = "auto",
     fill: Fill = True,
     preset: ProgramOption = None,
@@ -69,15 +63,10 @@ def stills(
         out=out,
         lights=lights,
         sphere=sphere or (),
-        spheres=spheres,
         dark=dark,
         mask=mask,
         transfer=transfer,
-        focal_px=focal_px,
-        focal_mm=focal_mm,
-        sensor_mm=sensor_mm,
-        radius_mm=None if radius_mm is None else parse_radius_mm(radius_mm),
-        circle=[parse_circle(text) for text in circle or ()],
+        **seen.parameters(),
         solver=solver,
         fill=fill,
         preset=preset,

@@ -1,9 +1,12 @@
 """The options of psvideo calibrate that several commands share (stills, too, measures lights), each written once."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+from psvideo.cli.options.typed import parse_circle, parse_radius_mm
 
 Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]
 PicturesOfTakes = Annotated[
@@ -32,3 +35,21 @@ Circles = Annotated[
     ),
 ]
 Spheres = Annotated[int, typer.Option(help="How many spheres each picture shows.", min=1, max=8)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphereWords:
+    """How mirror spheres and the lens that saw them are described, as typed."""
+
+    circle: Circles = None
+    spheres: Spheres = 1
+    focal_px: FocalPx = None
+    focal_mm: FocalMm = None
+    sensor_mm: SensorMm = None
+    radius_mm: RadiusMm = None
+
+    def parameters(self) -> dict[str, Any]:
+        """Return them as the library takes them."""
+        circles = [parse_circle(text) for text in self.circle or ()]
+        radius_mm = None if self.radius_mm is None else parse_radius_mm(self.radius_mm)
+        return vars(self) | {"circle": circles, "radius_mm": radius_mm}

@@ -1,12 +1,17 @@
 """Options that say how results are delivered, each written once."""
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
+from psvideo.cli.console import plain
+from psvideo.cli.options.per_light import parse_weights
+from psvideo.cli.options.typed import chosen_previews
 from psvideo.model.choices import (
+    USUAL_COMPRESSION,
     CameraTime,
     Compression,
     MapFiles,
@@ -102,3 +107,45 @@ ProgramOption = Annotated[
         "--for", help="Write what this program needs (single options come first), and a note on how to load it."
     ),
 ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeautyWords:
+    """What the beauty plate adds up, as typed."""
+
+    with_ambient: WithAmbient = False
+    weight: Weights = None
+
+    def parameters(self) -> dict[str, Any]:
+        """Return them as the library takes them."""
+        return vars(self) | {"weight": parse_weights(self.weight)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeliveryWords:
+    """What is written of normals, and in which convention, as typed."""
+
+    preset: ProgramOption = None
+    space: SpaceOption = None
+    camera_to_world: CameraToWorld = None
+    camera: CameraName = None
+    camera_time: CameraTimeOption = None
+    y: YOption = None
+    float32: FloatOption = False
+    aov: AovOption = None
+    mesh: MeshOption = None
+    encode: EncodeOption = None
+    separate: Separate = True
+    compression: CompressionOption = USUAL_COMPRESSION
+    multipart: Multipart = None
+    plates: Plates = False
+    preview: PreviewOption = None
+    no_preview: NoPreview = False
+    preview_codec: CodecOption = "both"
+
+    def parameters(self) -> dict[str, Any]:
+        """Return them as the library takes them, to which separate files are no choice. Raises UsageError where movies
+        are named and none are wanted."""
+        said = {name: word for name, word in vars(self).items() if name not in ("separate", "no_preview")}
+        previews = chosen_previews(self.preview, no_preview=self.no_preview)
+        return said | {"aov": plain(self.aov), "mesh": plain(self.mesh), "preview": previews}

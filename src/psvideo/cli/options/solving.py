@@ -1,10 +1,12 @@
-"""Options that say how normals are solved, each written once."""
+"""Options that say how normals are solved and which instants are shown, each written once."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from psvideo.cli.options.typed import parse_instants
 from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS, Align, Solver
 
 SolverOption = Annotated[
@@ -31,8 +33,8 @@ FlatPath = Annotated[
 NearIterations = Annotated[
     int | None,
     typer.Option(
-        help="Near lights only: how often their distances are corrected by the depth that the normals give. "
-        f"[default: {NEAR_ITERATIONS}; 0 with --depth]",
+        help="Near lights only: how often their distances are corrected by the depth that the normals give; "
+        f"left out: {NEAR_ITERATIONS}, and 0 with --depth.",
         min=0,
         max=MOST_ITERATIONS,
     ),
@@ -47,7 +49,7 @@ DepthPath = Annotated[
 ]
 DepthScale = Annotated[
     float | None,
-    typer.Option("--depth-scale", help="Metres per unit of --depth. [default: 1 for floats, 0.001 for integers]"),
+    typer.Option("--depth-scale", help="Metres per unit of --depth; left out: 1 for floats, 0.001 for integers."),
 ]
 AlignOption = Annotated[
     Align,
@@ -78,3 +80,29 @@ ResyncOption = Annotated[
     ),
 ]
 Denoise = Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolvingWords:
+    """How normals are solved, as typed."""
+
+    mask: MaskPath = None
+    flat: FlatPath = None
+    solver: SolverOption = "auto"
+    fill: Fill = True
+    near_iterations: NearIterations = None
+    depth: DepthPath = None
+    depth_scale: DepthScale = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstantWords:
+    """Which instants are shown, as typed."""
+
+    fps: FpsOption = "round"
+    shutter: ShutterOption = None
+    resync: ResyncOption = None
+
+    def parameters(self) -> dict[str, Any]:
+        """Return them as the library takes them."""
+        return vars(self) | {"fps": parse_instants(self.fps)}

@@ -9,10 +9,10 @@ import typer
 
 from psvideo.cli.commands.calibrate.of_takes import calibrate_all
 from psvideo.cli.console import Voice
-from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
+from psvideo.cli.options.calibrate import SphereWords, Transfer
 from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
-from psvideo.cli.options.typed import parse_circle, parse_point, parse_radius_mm
+from psvideo.cli.options.typed import parse_point
 from psvideo.errors import UsageError
 from psvideo.model.units import counted
 
@@ -28,15 +28,10 @@ def mirror_sphere(
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The rig file to write; a picture goes beside it (.png).")],
     *,
-    circle: Circles = None,
-    spheres: Spheres = 1,
-    focal_px: FocalPx = None,
-    focal_mm: FocalMm = None,
-    sensor_mm: SensorMm = None,
+    seen: SphereWords,
     principal_px: Annotated[
         str | None, typer.Option(help="Where the lens's axis meets the picture, in pixels: x,y; left out: its middle.")
     ] = None,
-    radius_mm: RadiusMm = None,
     outline_picture: Annotated[
         Path | None, typer.Option(help="A picture from the same camera with the room light on, to find the outline in.")
     ] = None,
@@ -56,15 +51,10 @@ def mirror_sphere(
     from psvideo.runs.calibrate.mirror_sphere import mirror_sphere as measure
 
     options: dict[str, Any] = dict(
-        circle=[parse_circle(text) for text in circle or ()],
-        spheres=spheres,
-        focal_px=focal_px,
-        focal_mm=focal_mm,
-        sensor_mm=sensor_mm,
         principal_px=None if principal_px is None else parse_point(principal_px, option="--principal-px"),
-        radius_mm=None if radius_mm is None else parse_radius_mm(radius_mm),
         outline_picture=outline_picture,
         transfer=transfer,
+        **seen.parameters(),
         **vars(words),
     )
     common: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
