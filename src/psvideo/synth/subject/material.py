@@ -1,5 +1,7 @@
 """Albedo over a surface: procedural patterns in the object's own space, vertex colours, and textures."""
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,9 +9,12 @@ from psvideo.model.camera import FloatArray
 from psvideo.synth.scene import AlbedoTable, Colour
 
 Colours = NDArray[np.float32]
+Keys = NDArray[np.uint64]
 
 PLAIN = 0.7
 """The albedo of a mesh that is asked for colours of its own and has none."""
+KEYS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+"""What a step along each axis adds to the key of a lattice node, modulo 2^64."""
 
 
 def colour(value: Colour) -> Colours:
@@ -54,21 +59,20 @@ def layered_noise(cells: FloatArray, octaves: int = 4) -> FloatArray:
 
 def _value_noise(points: FloatArray) -> FloatArray:
     """Return smooth noise between random values at the integer lattice, -1 to 1."""
-    base = np.floor(points).astype(np.int64)
-    part = points - base
+    along = np.ascontiguousarray(points.T)  # axis by axis: numpy is slow along a short last axis
+    base = np.floor(along)
+    part = along - base
     part = part * part * (3.0 - 2.0 * part)
+    key = base.astype(np.int64).astype(np.uint64) * KEYS[:, None]
+    sides = [((1.0 - here, first), (here, first + step)) for here, first, step in zip(part, key, KEYS, strict=True)]
     total = np.zeros(len(points))
-    for corner in np.ndindex(2, 2, 2):
-        weight = np.prod(np.where(np.array(corner, bool), part, 1.0 - part), axis=1)
-        total += weight * _lattice(base + np.array(corner))
+    for (x, at_x), (y, at_y), (z, at_z) in product(*sides):
+        total += x * y * z * _lattice(at_x + at_y + at_z)
     return total
 
 
-def _lattice(nodes: NDArray[np.int64]) -> FloatArray:
-    """Return a fixed random value of each lattice node, -1 to 1 (the mixing steps of splitmix64)."""
-    key = nodes.astype(np.uint64)
-    mixed = key[:, 0] * np.uint64(0x9E3779B97F4A7C15) + key[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
-    mixed += key[:, 2] * np.uint64(0x165667B19E3779F9)
+def _lattice(mixed: Keys) -> FloatArray:
+    """Return a fixed random value for the key of each lattice node, -1 to 1 (the mixing steps of splitmix64)."""
     mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return np.asarray((mixed >> np.uint64(11)).astype(np.float64) * (2.0 / 2**53) - 1.0)
