@@ -135,14 +135,16 @@ def _over_readouts(
     count = int(np.ceil(rows.period_s / step_s))
     readouts_s = np.arange(-count, count + 1) * rows.period_s / count
     total = np.empty((len(readouts_s), *loss.shape[:2]))
-    at = np.arange(len(phases_s))
+    phases = len(phases_s)
+    by_row = np.concatenate([np.moveaxis(loss, 2, 0)] * 2, axis=2)  # twice around the cycle: a place in it is a slice
     for r, readout_s in enumerate(readouts_s):
         place = rows.place if readout_s >= 0 else height - 1 - rows.place
         total[r] = 0.0
         for row, offset_s in enumerate(place / height * abs(readout_s)):
             below, part = divmod(offset_s / step_s, 1.0)
-            low = (at - int(below)) % len(phases_s)
-            total[r] += (1 - part) * loss[:, low, row] + part * loss[:, low - 1, row]
+            low = phases - int(below) % phases
+            here, before = by_row[row, :, low : low + phases], by_row[row, :, low - 1 : low - 1 + phases]
+            total[r] += (1 - part) * here + part * before
     found = []
     for r, a, b, value in _best(total / loss.shape[2], keep):
         beat = Beat(
