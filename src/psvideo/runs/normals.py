@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from psvideo.clip import decoded_once
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
+from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.usd import require_usd
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
@@ -184,11 +186,7 @@ def normals(
         preview=preview,
         preview_codec=preview_codec,
     )
-    delivery, at_odds = delivery_of(asked)
-    for sentence in at_odds:
-        caller.warn(sentence)
-    if "usd" in delivery.meshes:
-        require_usd()
+    delivery = _delivery(asked, caller)
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
     rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
@@ -209,24 +207,38 @@ def normals(
     timing_path = path_if_given("timing", timing)
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
     noted = noted_timing(unfinished_folder_of(output.folder)) if going_on and timing_path is None else None
+    job_of = partial(
+        Job,
+        lighting=lighting,
+        delivery=delivery,
+        solver=solver,
+        over_time=over_time,
+        fill=fill,
+        start_number=start_number,
+    )
     with decoded_once(take, output=output.folder) as kept:
         found = noted or read_or_find_timing(
             kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch
         )
-        job = Job(
-            take=kept,
-            timing=said_timing(found, caller),
-            lighting=lighting,
-            delivery=delivery,
-            solver=solver,
-            over_time=over_time,
-            fill=fill,
-            start_number=start_number,
-        )
-        if piece is not None:
-            return piece_run(job, output, piece, watch=watch)
-        done = normals_run(job, output, watch=watch)
-        say_kept(kept.kept, caller)
+        job = job_of(take=kept, timing=said_timing(found, caller))
+        return _solved(job, output, piece, watch, caller)
+
+
+def _delivery(asked: Asked, caller: Caller) -> Delivery:
+    """Return what is to be delivered; says where that goes against a program's preset."""
+    delivery, at_odds = delivery_of(asked)
+    for sentence in at_odds:
+        caller.warn(sentence)
+    if "usd" in delivery.meshes:
+        require_usd()
+    return delivery
+
+
+def _solved(job: Job, output: Output, piece: str | None, watch: Watch, caller: Caller) -> RunReport:
+    if piece is not None:
+        return piece_run(job, output, piece, watch=watch)
+    done = normals_run(job, output, watch=watch)
+    say_kept(job.take.kept, caller)
     return done.report
 
 

@@ -18,7 +18,7 @@ from psvideo.model.quantities import Aov
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
-from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
+from psvideo.runs.calibrate.mirror_sphere import looking_for, radius_in_m
 from psvideo.runs.delivery.beforehand import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.results import normals_run
@@ -106,12 +106,7 @@ def stills(
         raise UsageError("`aov='motion'`: photographs of a still scene show no motion. Leave it out.")
     asked = Asked(preset=preset, aov=aov, mesh=mesh, encode=encode, plates=plates)
     delivery, _ = delivery_of(asked)
-    looking = Looking(
-        spheres=spheres,
-        circles=tuple(circle),
-        focal_px=focal_px,
-        focal_widths=focal_widths(focal_px, focal_mm, sensor_mm),
-    )
+    looking = looking_for(spheres, circle, focal_px, focal_mm, sensor_mm)
     known = _known_lights(
         path_if_given("lights", lights),
         [path_of("sphere", one) for one in sphere],

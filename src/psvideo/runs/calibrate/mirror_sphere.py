@@ -1,6 +1,7 @@
 """The whole of ``psvideo calibrate mirror-sphere``."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import read_picture
@@ -57,13 +58,7 @@ def mirror_sphere(
     """
     rig_path = rig_out(out, force=force)
     picture = picture_beside(rig_path, force=force)
-    looking = Looking(
-        spheres=spheres,
-        circles=tuple(circle),
-        focal_px=focal_px,
-        focal_widths=focal_widths(focal_px, focal_mm, sensor_mm),
-        principal_px=principal_px,
-    )
+    looking = replace(looking_for(spheres, circle, focal_px, focal_mm, sensor_mm), principal_px=principal_px)
     radius_m = radius_in_m(radius_mm)
     reading = reading_of(plan, frames, first_light, transfer)
     room = None if outline_picture is None else Path(outline_picture)
@@ -91,13 +86,20 @@ def _sightings(
     return sightings
 
 
-def focal_widths(focal_px: float | None, focal_mm: float | None, sensor_mm: float | None) -> float | None:
-    """Return the focal length in widths of the picture, where it is given in millimetres."""
+def looking_for(
+    spheres: int,
+    circle: Sequence[tuple[float, float, float]],
+    focal_px: float | None,
+    focal_mm: float | None,
+    sensor_mm: float | None,
+) -> Looking:
+    """Return how spheres are looked for, from the parameters of that name. Raises UsageError where they are at odds."""
     if focal_px is not None and focal_mm is not None:
         raise UsageError("`focal_px` and `focal_mm` both say the focal length; give one of them.")
     if (focal_mm is None) != (sensor_mm is None):
         raise UsageError("`focal_mm` and `sensor_mm` go together: the focal length, and the width of the sensor.")
-    return None if focal_mm is None or sensor_mm is None else focal_mm / sensor_mm
+    widths = None if focal_mm is None or sensor_mm is None else focal_mm / sensor_mm
+    return Looking(spheres=spheres, circles=tuple(circle), focal_px=focal_px, focal_widths=widths)
 
 
 def radius_in_m(radius_mm: float | None) -> float | None:

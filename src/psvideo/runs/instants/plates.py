@@ -8,7 +8,7 @@ from pathlib import Path
 
 from psvideo.clip import Clip, Take
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.compute.threads import writing
+from psvideo.compute.threads import Submit, writing
 from psvideo.errors import PsvideoError
 from psvideo.export.sequences.plate_files import plate_name, write_flash, write_plate
 from psvideo.export.sequences.tags import Tags
@@ -21,7 +21,9 @@ from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
 from psvideo.plates.gather import first_ambient, gather
-from psvideo.plates.sequence import AMBIENT, round_numbers
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.sequence import AMBIENT, Round, round_numbers
+from psvideo.plates.split import Plate
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.beforehand import say_instants
 from psvideo.runs.delivery.delivering import plates_of
@@ -91,9 +93,7 @@ def split_run(
         _at_the_end(folder, take, output, times_s, extras, tags, watch),
         writing() as write,
     ):
-        flashes, mix = extras.flashes, extras.mix
-        one_flash = partial(write_flash, folder, clip.name, tags=tags, turn=clip.turn, compression=extras.compression)
-        each = (lambda plate: write(partial(one_flash, plate))) if flashes else None
+        files = _Files(folder=folder, clip=clip, tags=tags, extras=extras, resume=output.resume, write=write)
         gathered = gather(
             take,
             timing,
@@ -101,24 +101,18 @@ def split_run(
             method=method,
             start_number=output.start_number,
             watch=watch,
-            each_flash=each,
+            each_flash=files.write_flash if extras.flashes else None,
             each_window=observed.look_at_window,
         )
-        ambient = first_ambient(take, timing) if mix is not None and mix.of(AMBIENT) else None
+        ambient = first_ambient(take, timing) if extras.mix is not None and extras.mix.of(AMBIENT) else None
         for one in gathered:
             times_s.append(one.time_s)
             ambient = one.ambient or ambient
-            whole = one.lights == clip.plan.lights
-            sums = (beauty_of(one, mix, ambient),) if mix is not None and whole else ()
-            for plate in (*plates_of(one), *sums):
-                name = plate_name(clip.name, plate.light, plate.number)
-                written.add(name)
-                if not (output.resume and (folder / name).is_file()):
-                    write(partial(write_plate, folder, clip.name, plate, tags, compression=extras.compression))
+            written |= files.write_round(one, ambient)
             observed.add(one)
             if len(observed.facts) in (1, SAMPLE_ROUND):
                 picture = plates_sheet(one)
-            del one, plate, sums  # they would be held while the next round gathers
+            del one  # it would be held while the next round gathers
         if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))
         if aligning is None:
@@ -127,6 +121,39 @@ def split_run(
         report = run_report(take, timing, observed, output)
         write_report(folder, report, [("One round", picture)])
     return SplitResult(timing=timing, report=report)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Files:
+    """The plates' files: where they lie, what they say of themselves, and what takes the writing of each."""
+
+    folder: Path
+    clip: Clip
+    tags: Tags
+    extras: Extras
+    resume: bool
+    write: Submit
+
+    def write_flash(self, plate: Plate) -> None:
+        """Write one flash by itself."""
+        turn, compression = self.clip.turn, self.extras.compression
+        self.write(
+            partial(write_flash, self.folder, self.clip.name, plate, self.tags, turn=turn, compression=compression)
+        )
+
+    def write_round(self, one: Round, ambient: LightPlate | None) -> set[str]:
+        """Write a round's plates, their sum among them where it is asked for; return their names. What a run that was
+        stopped has written stays."""
+        mix, compression = self.extras.mix, self.extras.compression
+        whole = one.lights == self.clip.plan.lights
+        sums = (beauty_of(one, mix, ambient),) if mix is not None and whole else ()
+        names = set()
+        for plate in (*plates_of(one), *sums):
+            name = plate_name(self.clip.name, plate.light, plate.number)
+            names.add(name)
+            if not (self.resume and (self.folder / name).is_file()):
+                self.write(partial(write_plate, self.folder, self.clip.name, plate, self.tags, compression=compression))
+        return names
 
 
 @contextmanager
