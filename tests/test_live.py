@@ -88,6 +88,14 @@ def test_a_clip_without_the_plans_strobe_ends_in_one_paragraph(clip: Path, capsy
     assert "there is no such clip" in capsys.readouterr().err
 
 
+def test_a_clip_in_colour_is_followed_with_a_rig_that_knows_the_colours_of_lights(clip: Path, tmp_path: Path) -> None:
+    rig = ps.read_rig(clip / "rig.toml")
+    coloured = tuple(replace(light, intensity=(1.0, 0.9, 0.8)) for light in rig.lights)
+    (tmp_path / "coloured.toml").write_text(format_rig(replace(rig, lights=coloured)), encoding="utf-8")
+    assert ps.open_take(clip).clip.channels == 3
+    assert live(clip, rig=tmp_path / "coloured.toml", page=False, pace="fastest").results > 1
+
+
 def test_a_rig_that_gives_no_normals_is_refused_before_anything_is_shown(clip: Path, tmp_path: Path) -> None:
     rig = ps.read_rig(clip / "rig.toml")
     turned = [(float(np.sin(at)), 0.0, float(np.cos(at))) for at in np.linspace(-0.6, 0.6, len(rig.lights))]

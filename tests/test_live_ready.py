@@ -16,6 +16,8 @@ from memory_frame import MemoryFrame
 
 import psvideo as ps
 from psvideo.cli.app import main
+from psvideo.cli.commands.live import _Telling
+from psvideo.cli.console import Voice
 from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_counted
 from psvideo.live.chain import Chain, LiveFrame
 from psvideo.live.incoming.source import LiveSource
@@ -23,7 +25,7 @@ from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.result_times import ResultTimes
 from psvideo.live.running import Running
 from psvideo.live.showing.quality import first_quality
-from psvideo.live.status import LiveStatus
+from psvideo.live.status import SAID, LiveState, LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
@@ -81,6 +83,37 @@ def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: 
     assert order == ["rehearsed", "read"]
     assert left_alone[0] > 10_000, "no search for cycles among what is loaded holds frames up"
     assert gc.get_freeze_count() == 0
+
+
+def standing(*, at_s: float, state: LiveState, fps: float, frames: int) -> LiveStatus:
+    return LiveStatus(
+        at_s=at_s,
+        state=state,
+        fps=fps,
+        frames=frames,
+        lost=0,
+        results=0,
+        results_per_s=0.0,
+        age_s=None,
+        oldest_s=None,
+        phase_error_rows=None,
+        clock_offset_ppm=None,
+        width_px=96,
+        height_px=72,
+    )
+
+
+def test_where_lines_stay_one_comes_when_something_changes_and_every_ten_seconds(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    told = _Telling(voice=Voice())
+    held: list[tuple[LiveState, float]] = [("locked", 100.0)] * 26
+    states: list[tuple[LiveState, float]] = [("seeking", 100), *held, ("locked", 0.0), ("locked", 0.0)]
+    for second, (state, fps) in enumerate([*states, ("lost", 100.0)]):
+        told.say(standing(at_s=float(second), state=state, fps=fps, frames=second + 1))
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(" | ")[0] for line in lines] == [SAID["seeking"], *[SAID["locked"]] * 4, SAID["lost"]]
+    assert [line.split(" | ")[2].split()[0] for line in lines] == ["1", "2", "12", "22", "28", "30"]
 
 
 def test_what_is_compiled_is_counted_and_said_until_it_is_done() -> None:

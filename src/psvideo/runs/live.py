@@ -142,7 +142,8 @@ def _check_rig(rig: Rig, source: LiveSource) -> None:
     """Raise PsvideoError where a rig gives no normals: before a board flashes, not when the first round is solved."""
     lights, camera = lights_as_planned(rig, source.plan), source.plan.camera
     near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
-    illumination(lights, channels=1 if source.cfa is None else 3, ground=None if near is None else near.ground)
+    channels = source.channels or max(len(light.by_channel) for light in lights)
+    illumination(lights, channels=channels, ground=None if near is None else near.ground)
 
 
 def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:

@@ -5,6 +5,7 @@ import sys
 import webbrowser
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,9 @@ from psvideo.strobe.link.ports import AUTO
 
 if TYPE_CHECKING:
     from psvideo.live.status import LiveStatus
+
+STAYS_S = 10.0
+"""Where lines are not written over, one comes so often as long as nothing changes."""
 
 
 @spread
@@ -149,11 +153,13 @@ def _open(voice: Voice, url: str, *, browser: bool) -> None:
 @dataclass(kw_only=True)
 class _Telling:
     """Says how things stand: a line that is written over on a terminal, one line of JSON a second for machines; and
-    what there is to say of the run when it comes up, each sentence once."""
+    what there is to say of the run when it comes up, each sentence once. Elsewhere lines stay, and say what is new."""
 
     voice: Voice
     warned: set[str] = field(default_factory=set)
     waited: str = ""
+    stood: tuple[str, bool] = ("", False)
+    written_s: float = -inf
 
     def say(self, status: "LiveStatus") -> None:
         """Say what the last second was."""
@@ -167,8 +173,16 @@ class _Telling:
         self.waited = status.waits_for
         if self.voice.json:
             print(texts.dumps(status.record), flush=True)
-        elif not self.voice.quiet:
+        elif not self.voice.quiet and (over or self._is_news(status)):
             print(f"{over}{status.line}", end="" if over else "\n", file=sys.stderr, flush=True)
+
+    def _is_news(self, status: "LiveStatus") -> bool:
+        """Return whether things stand otherwise than in the last line that stays, or that line is old."""
+        stands = (status.state, status.fps > 0)
+        news = stands != self.stood or status.at_s - self.written_s >= STAYS_S
+        if news:
+            self.stood, self.written_s = stands, status.at_s
+        return news
 
     def warn(self, words: Sequence[str]) -> None:
         """Warn of what was not yet said."""

@@ -27,7 +27,8 @@ class LiveSource:
 
     ``kind`` is a few pixels as its frames are likely to be coded.
     ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
-    mosaic. ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
+    mosaic. ``channels`` is how many its pictures have once they are demosaiced, None where only its frames will tell.
+    ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
     when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it, ``notes``
     what happened to it on the way; ``check`` what to look at where no frames come.
     """
@@ -37,6 +38,7 @@ class LiveSource:
     frames: Callable[[], Iterator[LiveFrame]]
     kind: Coded
     cfa: str | None = None
+    channels: int | None = None
     first_number: int = 0
     plan_path: Path | None = None
     paced: bool = True
@@ -89,6 +91,7 @@ def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:
         kind=_kind(clip),
         frames=frames,
         cfa=clip.cfa,
+        channels=clip.channels,
         first_number=clip.numbers[0],
         plan_path=clip.plan_path if clip.kind in PLAIN and clip.header.bits in (8, 16) else None,
         paced=pace == "own",
