@@ -52,6 +52,18 @@ def flashes_of(plan: Plan, count: int, without: tuple[int, ...] = ()) -> tuple[F
     )
 
 
+@pytest.mark.parametrize(
+    ("given", "exact"), [(23.976, "24000/1001"), ("59.94", "60000/1001"), (12.5, "25/2"), ("0.3", "3/10")]
+)
+def test_rounded_rates_mean_the_same_in_python_as_on_the_command_line(
+    make_plan: PlanMaker, given: str | float, exact: str
+) -> None:
+    plan = make_plan(lights=("a", "b", "c", "d"), dark=False)
+    assert parse_instants(str(given)) == Fraction(exact)
+    comb = rate_of(given, plan)
+    assert sequence_fps(plan, comb) == Fraction(exact)
+
+
 @pytest.mark.parametrize("fps", ["24", "24000/1001", "25", "30", "48", "60", "frame"])
 def test_instants_of_a_rate_are_exact_each_once_and_lie_between_a_rounds_neighbours(
     make_plan: PlanMaker, fps: str

@@ -7,9 +7,8 @@ from fractions import Fraction
 
 from psvideo.cli.console import plain
 from psvideo.errors import UsageError
-from psvideo.formats.plan_toml import parse_fps
+from psvideo.formats.plan_toml import broadcast_fps
 from psvideo.model.choices import PREVIEWS, Preview
-from psvideo.model.units import NTSC
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
@@ -110,13 +109,9 @@ def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
     (Fraction(120000, 1001), Fraction(120, 1), Fraction(60000, 1001))
     """
     try:
-        rate = parse_fps(text.strip())
+        return broadcast_fps(text.strip())
     except ValueError as fault:
         raise UsageError(f"{option} {text!r} is not a frame rate: {fault}.") from None
-    whole = round(rate / NTSC)
-    exact = whole * NTSC
-    is_rounded = "." in text and rate.denominator > 1 and abs(rate / exact - 1) < Fraction(200, 1_000_000)
-    return exact if is_rounded and whole % 6 == 0 else rate
 
 
 def parse_instants(text: str) -> str | Fraction:

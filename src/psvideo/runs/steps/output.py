@@ -12,7 +12,7 @@ from psvideo.errors import UsageError
 from psvideo.export.sequences.tags import Tags, sha256_of
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.formats.clocks_json import read_clocks
-from psvideo.formats.plan_toml import parse_fps
+from psvideo.formats.plan_toml import broadcast_fps
 from psvideo.formats.whole_folders import begun_folder, refuse_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
@@ -108,7 +108,7 @@ def rate_of(
     if fps == "frame":
         return comb_of(camera.fps, camera, shutter_deg=shutter)
     try:
-        exact = parse_fps(str(fps))
+        exact = broadcast_fps(str(fps))
     except ValueError as fault:
         raise UsageError(f"`fps` {fps}: {fault}; or one of round, flash, frame.") from None
     clocks = None if resync is None else read_clocks(resync)
