@@ -145,6 +145,27 @@ def test_measured_pixels_are_the_same_to_the_bit_filled_or_not() -> None:
     np.testing.assert_array_equal(whole.normals[whole.valid], plain.normals[plain.valid])
 
 
+@pytest.mark.parametrize("channels", [1, 3])
+def test_what_every_light_clips_is_shown_and_filled(channels: int) -> None:
+    normals, inside = ball()
+    plates = plates_of(normals, np.array([0.5, 0.4, 0.3]))
+    clipped = np.zeros_like(inside)
+    clipped[40:80, 30:60] = True
+    unseen = np.zeros((len(plates), SIZE, SIZE), bool)
+    unseen[:, 4:8, 4:8] = True
+    for plate in plates:
+        plate[clipped | unseen[0]] = 1.0
+    if channels == 1:
+        plates = [plate[..., 0].copy() for plate in plates]
+    lit = Illumination(directions=LIGHTS, intensities=np.ones((len(LIGHTS), channels)))
+    surface = Solving(error=True).solve(plates, lit, seen=~unseen)
+    assert surface.source is not None
+    assert not surface.valid[clipped].any()
+    assert (surface.source[clipped] == NO_LIGHT).all()
+    np.testing.assert_allclose(np.linalg.norm(surface.normals[clipped], axis=-1), 1, atol=1e-3)
+    assert not surface.shown[unseen[0]].any(), "a code that no row saw is none"
+
+
 def test_a_small_hole_that_no_light_reaches_is_filled_and_the_void_is_not() -> None:
     normals, inside = ball()
     plates = plates_of(normals, np.array([0.5, 0.4, 0.3]))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, ZERO
-from psvideo.solve.normals.loops.measuring import any_asked, read_block
+from psvideo.solve.normals.loops.measuring import any_asked, is_clipped, is_seen, read_block, samples_of
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Task, Work
 
@@ -41,7 +41,8 @@ def said_for(pixels: int, noise: float) -> Said:
 
 @FUSED.kept
 def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int, last: int) -> None:
-    """Count for every ``wanted`` pixel (row, col) of the rows the lights that reach it, into ``counts``."""
+    """Count for every ``wanted`` pixel (row, col) of the rows the lights that reach it, into ``counts``: those too whose
+    plates are saturated there."""
     t = lent_task(task, work.matrix, work.per_strength)
     asked, found, values = lent(wanted), lent(counts), lent(work.values)
     channels = t.tone.shape[1]
@@ -53,13 +54,15 @@ def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int,
                 continue
             read_block(t, values, row, col, n)
             for light in range(t.lights):
-                per = t.per_strength[light]
+                per, samples = t.per_strength[light], samples_of(t, light, row * t.cols + col, n)
                 for i in range(n):
+                    if not asked[row, col + i]:
+                        continue
                     bright = ZERO
                     for channel in range(channels):
                         bright += values[light * channels + channel, i]
-                    reached = asked[row, col + i] and bright * at(per, i) * share > t.dark
-                    found[row, col + i] += reached
+                    over = is_clipped(t, samples, light, i) and is_seen(t.seen, light, row, col + i)
+                    found[row, col + i] += over or bright * at(per, i) * share > t.dark
 
 
 @FUSED.kept

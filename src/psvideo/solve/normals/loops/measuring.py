@@ -53,6 +53,23 @@ def gather_three(task: Task, values: Floats, start: int, n: int) -> None:
 
 
 @FUSED.inlined
+def is_clipped(task: Task, samples: Samples, light: int, place: int) -> bool:
+    """Whether any channel of a pixel of ``samples_of`` is saturated, seen or not."""
+    channels = task.tone.shape[1]
+    over = False
+    for channel in range(channels):
+        gain, offset, ceiling, _ = task.tone[light, channel]
+        over |= np.float32(samples[place * channels + channel]) * gain + offset >= ceiling
+    return over
+
+
+@FUSED.inlined
+def is_seen(seen: Bytes, light: int, row: int, col: int) -> bool:
+    """Whether a light was seen in a pixel; one entry may stand for the whole row."""
+    return not seen.size or bool(seen[light, row, 0 if seen.shape[2] == 1 else col])
+
+
+@FUSED.inlined
 def combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
     """One measurement per light from three channels, each weighted by its own brightness over the lights.
 
