@@ -41,8 +41,8 @@ def said_for(pixels: int, noise: float) -> Said:
 
 @FUSED.kept
 def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int, last: int) -> None:
-    """Count for every ``wanted`` pixel (row, col) of the rows the lights that reach it, into ``counts``: those too whose
-    plates are saturated there."""
+    """Count for every ``wanted`` pixel (row, col) of the rows the lights that reach it, into ``counts``; those whose
+    plates are saturated there reach it too."""
     t = lent_task(task, work.matrix, work.per_strength)
     asked, found, values = lent(wanted), lent(counts), lent(work.values)
     channels = t.tone.shape[1]
