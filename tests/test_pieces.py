@@ -20,12 +20,18 @@ from numpy.typing import NDArray
 
 import psvideo as ps
 from psvideo.cli.app import main
+from psvideo.clip import read_frames
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_folders import begun_folder, whole_folder
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.rows.shutter import row_weights
+from psvideo.plates import gather as gather_module
+from psvideo.plates import spread
 from psvideo.plates.align import held
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.gather import gather
+from psvideo.plates.spread import rounds_spread, spread_over
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
@@ -177,6 +183,73 @@ def test_a_run_in_pieces_gives_the_bytes_of_one_at_one_go(tmp_path: Path, monkey
     same_in_pieces(clip, tmp_path, ("0/9", "9/9"), **options)
     with pytest.raises(AllDoneError):
         ps.normals(clip, out=tmp_path / "pieces", rig=clip / "rig.toml", piece="2/3", **options)
+
+
+GLOSSY = """
+schema = "psvideo-scene/1"
+name = "gloss"
+frames = 46
+output = { kind = "png16" }
+ambient = { level = 0.02 }
+[camera]
+width_px = 96
+height_px = 72
+fps = 100
+shutter_deg = 360
+readout_s = 0.0097
+width_m = 1.0
+full_well_e = 9000
+[[object]]
+mesh = "sphere"
+albedo = { pattern = "noise" }
+specular = { strength = 0.3, roughness = 0.35 }
+motion = { velocity_m_per_s = [0.3, 0.0, 0.0] }
+"""
+GLOSSY += "".join(
+    f"[[light]]\nname = '{name}'\ndirection = [{x}, {y}, 0.8]\n"
+    for name, (x, y) in zip(
+        "abcdef", [(0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6), (0.2, 0.1), (-0.3, 0.3)], strict=True
+    )
+)
+
+
+def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_first_noted(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(GLOSSY, encoding="utf-8")
+    clip = Path(ps.shoot(tmp_path / "scene.toml", tmp_path / "clip").path)
+    given: dict[str, Any] = {"rig": clip / "rig.toml", "preview": ()}
+    whole = ps.normals(clip, out=tmp_path / "whole", **given)
+    found = {None if one.misfit is None else one.misfit.reflectance for one in whole.instants}
+    assert len(whole.instants) >= 4
+    assert len(found) == 1
+    assert None not in found
+    ps.normals(clip, out=tmp_path / "pieces", piece="3/3", **given)
+    noted_by_first = next(tmp_path.glob(".*/.pieces/subject.json"))
+    assert json.loads(noted_by_first.read_text())["reflectance"] == list(found.pop() or ())
+    ps.normals(clip, out=tmp_path / "pieces", resume=True, **given)
+    assert digest(tmp_path / "pieces") == digest(tmp_path / "whole")
+    assert judged(tmp_path / "pieces") == judged(tmp_path / "whole")
+
+
+def test_what_comes_in_late_is_looked_at_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spread, "EACH", 2)
+    (tmp_path / "scene.toml").write_text(GLOSSY, encoding="utf-8")
+    take = ps.open_take(Path(ps.shoot(tmp_path / "scene.toml", tmp_path / "clip").path))
+    timing = ps.find_timing(take)
+    every = {one.number: one for one in gather(take, timing, aligning=Aligning())}
+    read: list[int] = []
+
+    def counted(clip: Any, numbers: Any, **options: Any) -> Any:
+        read.extend(numbers)
+        return read_frames(clip, numbers, **options)
+
+    monkeypatch.setattr(gather_module, "read_frames", counted)
+    some = [*rounds_spread(take, timing, aligning=Aligning())]
+    assert [one.number for one in some] == [min(one, max(every) - 1) for one in spread_over([*every])]
+    assert some[-1].number >= max(every) - 1
+    assert len(read) < 0.9 * len(take.numbers) * len(some)
+    for one in some:
+        for plate, other in zip(one.plates, every[one.number].plates, strict=True):
+            assert np.abs(plate.image - other.image).mean() < 0.004
 
 
 CUTS = (("7/7",), ("2/7", "5/7"), ("20/60", "33/60", "34/60"))

@@ -8,10 +8,10 @@ from ring_and_ball import ring
 
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
-from psvideo.model.surface import Reflectance, Surface
+from psvideo.model.surface import Reflectance, Subject, Surface
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.robust import huber1981
-from psvideo.solve.normals.robust.reflectance import reflectance_of
+from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.reflectance_fit import _rough as rough_in_the_fit
 from psvideo.solve.normals.robust.reflecting import _rough as rough_in_loops
@@ -55,7 +55,7 @@ def off_deg(found: NDArray[np.floating], truth: Array) -> Array:
 
 
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(huber1981, "reflectance_of", lambda *_, **__: None)
+    monkeypatch.setattr(huber1981, "points_of", lambda *_, **__: None)
 
 
 def test_a_sheen_that_the_whole_subject_has_turns_no_normal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +194,9 @@ def test_what_roughness_gains_with_a_turn_is_its_slope_in_the_loop_and_in_the_fi
     np.testing.assert_allclose(in_loops, slopes, rtol=1e-3, atol=1e-5)
     lights = np.zeros((1, len(cosine), 3))
     lights[0, :, 2] = towards
-    points = SubjectPoints(measured=lights[..., 0], counts=lights[..., 0], towards=lights, half=lights)
+    points = SubjectPoints(
+        measured=lights[..., 0], counts=lights[..., 0], towards=lights, half=lights, normals=lights[0]
+    )
     in_fit = rough_in_the_fit(points, np.outer(facing, (0, 0, 1)), cosine[None])
     np.testing.assert_allclose([each[0] for each in in_fit], slopes, rtol=1e-3, atol=1e-5)
 
@@ -226,6 +228,34 @@ def test_near_lights_show_the_same_sheen() -> None:
     np.testing.assert_allclose(near, far, atol=0.06)
 
 
+def test_a_subject_that_is_known_is_solved_as_one_that_was_found() -> None:
+    lit, sent = distant()
+    plates = shot(waves(), sent, gloss=0.15)
+    alone, matte = (Solving(subject=known).solve(plates, lit) for known in (None, Subject(reflectance=None)))
+    look = Solving().look(plates, lit)
+    assert look is not None
+    again = Solving(subject=Subject(reflectance=reflectance_of([look]))).solve(plates, lit)
+    assert again.normals.tobytes() == alone.normals.tobytes()
+    assert again.albedo.tobytes() == alone.albedo.tobytes()
+    assert matte.misfit is not None
+    assert matte.misfit.reflectance is None
+    assert off_deg(matte.normals, waves()).mean() > 2 * off_deg(alone.normals, waves()).mean()
+
+
+def test_what_one_look_at_a_subject_cannot_show_another_does() -> None:
+    """A round in which clay stands flat before the camera says nothing of it, and takes nothing from one that does."""
+    flat = np.broadcast_to([0.0, 0.0, 1.0], (SIZE, SIZE, 3))
+    looks = [Solving().look(clay(normals, WAYS, roughness=0.5), under(WAYS)) for normals in (flat, waves())]
+    of_flat, of_waves = (look for look in looks if look is not None)
+    assert reflectance_of([of_flat]) is None
+    alone, together = reflectance_of([of_waves]), reflectance_of([of_flat, of_waves])
+    assert alone is not None
+    assert together is not None
+    np.testing.assert_allclose(together, alone, atol=0.05)
+    assert together.rough > 0.3
+    assert reflectance_of([]) is None
+
+
 def seen_in(plates: list[NDArray[np.float32]], lit: Illumination) -> Reflectance | None:
     """Return what is found of a subject whose normals are known."""
     found = Surface(
@@ -233,4 +263,5 @@ def seen_in(plates: list[NDArray[np.float32]], lit: Illumination) -> Reflectance
         albedo=np.full((SIZE, SIZE, 3), 0.5, np.float32),
         valid=np.ones((SIZE, SIZE), bool),
     )
-    return reflectance_of(plates, lit, found, Usable(dark_level=0.003), step=1, seen=None, black_level=0.0, scale=1.0)
+    points = points_of(plates, lit, found, Usable(dark_level=0.003), step=1, seen=None, black_level=0.0, scale=1.0)
+    return None if points is None else reflectance_of([points])

@@ -30,6 +30,14 @@ class Reflectance(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Subject:
+    """What the rounds of a take share of their subject. ``reflectance``: beyond n . l, None where that explains little
+    and the subject counts as matte."""
+
+    reflectance: Reflectance | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class Misfit:
     """What the lights leave unexplained in a typical pixel of one picture, whichever pixel that is.
 

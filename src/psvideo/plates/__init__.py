@@ -6,8 +6,8 @@
 - plates of flashes: ``split``; ``nearest_rows`` fills rows that a flash missed from the nearest round that saw them
 - rounds: ``light_plate`` and ``sequence`` collect them, ``upright`` turns them
 
-Besides: ``part`` (a range of frames alone), ``beauty`` (all lights at once), ``hudon2015`` (the published method, to
-compare with).
+Besides: ``part`` (a range of frames alone), ``spread`` (a few rounds of a take, for what all share), ``beauty`` (all
+lights at once), ``hudon2015`` (the published method, to compare with).
 
 Rooms:
 

@@ -214,9 +214,10 @@ def _decode_ahead(take: Take, numbers: tuple[int, ...], watch: Watch) -> None:
     clip, kept = take.clip, take.kept
     if kept is None or take.plan.mode == "synced" or holds_plain_codes(clip):
         return
-    if not (len(kept) or kept.missed):
-        frames = read_frames(clip, numbers, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
-        deque(watch(frames, total=len(numbers), what="decoding"), maxlen=0)
+    missing = [number for number in numbers if number not in kept]
+    if missing and not kept.missed:
+        frames = read_frames(clip, missing, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
+        deque(watch(frames, total=len(missing), what="decoding"), maxlen=0)
 
 
 def _dark_slots_come_often(take: Take, timing: Timing) -> bool:

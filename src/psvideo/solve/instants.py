@@ -1,6 +1,6 @@
 """Rounds of plates in, the surface at every instant out."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,12 +19,14 @@ from psvideo.model.irradiance.intensity import (
 )
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
-from psvideo.model.surface import Surface
+from psvideo.model.surface import Subject, Surface
 from psvideo.plates.align.denoise import Average, added, averaged
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.robust.reflectance import reflectance_of
+from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Samples
 from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
@@ -70,16 +72,39 @@ def surfaces(
     them, and nothing is held from one to the next. Raises PsvideoError where the rig lacks a light, its lights
     give no normals, or a round has no mask.
     """
-    lights = lights_as_planned(rig, plan)
-    shares = None if falloff is None else [falloff.field(light.name) for light in lights]
-    if shares is not None:
-        lights = tuple(where_least_arrives(light, share) for light, share in zip(lights, shares, strict=True))
-
-    solver = _RoundSolver(
-        lights=lights, shares=shares, masks=masks, solving=solving, near=near, asked=asked, one_by_one=one_by_one
+    solver = _RoundSolver.of(
+        plan, rig, masks=masks, solving=solving, near=near, falloff=falloff, asked=asked, one_by_one=one_by_one
     )
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solver.solve, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+def subject_of(
+    gathered: Iterable[Round],
+    plan: Plan,
+    rig: Rig,
+    *,
+    masks: Masks | None = None,
+    solving: Solving = Solving(),
+    near: NearSurface | None = None,
+    falloff: Falloff | None = None,
+) -> Subject | None:
+    """Return what all rounds of a take share of their subject, found from a few of them; None where there are none.
+    Arguments are those of ``surfaces``."""
+    solver = _RoundSolver.of(plan, rig, masks=masks, solving=solving, near=near, falloff=falloff)
+    looks = [*map(solver.look, filter(lambda one: one.lights == plan.lights, gathered))]
+    return Subject(reflectance=reflectance_of([one for one in looks if one is not None])) if looks else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Given:
+    """A round as the solver takes it: pictures, which rows or pixels every light shows (``shown`` is None where that is
+    all), and where to solve."""
+
+    plates: Sequence[Samples] | Sequence[Mixture]
+    seen: NDArray[np.bool_]
+    shown: NDArray[np.bool_] | None
+    mask: NDArray[np.bool_] | None
 
 
 @dataclass(kw_only=True)
@@ -95,35 +120,69 @@ class _RoundSolver:
     one_by_one: bool
     steady: Steady | None = None
 
+    @classmethod
+    def of(
+        cls,
+        plan: Plan,
+        rig: Rig,
+        *,
+        masks: Masks | None,
+        solving: Solving,
+        near: NearSurface | None,
+        falloff: Falloff | None,
+        asked: AskedPasses = AskedPasses(),
+        one_by_one: bool = False,
+    ) -> "_RoundSolver":
+        """Arguments are those of ``surfaces``."""
+        lights = lights_as_planned(rig, plan)
+        shares = None if falloff is None else [falloff.field(light.name) for light in lights]
+        if shares is not None:
+            lights = tuple(where_least_arrives(light, share) for light, share in zip(lights, shares, strict=True))
+        return cls(
+            lights=lights, shares=shares, masks=masks, solving=solving, near=near, asked=asked, one_by_one=one_by_one
+        )
+
     def solve(self, one: Round) -> Instant:
         """Solve one round; where its subject stood still, trust is that of the rounds before."""
-        mask = None if self.masks is None else self.masks.at(one.number)
-        whole = all(plate.seen.ndim == 1 for plate in one.plates)
-        seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
-        shown = None if seen.all() else seen
-        plates = _pictures(one, self.shares)
-        surface, lit = self._surface(one, plates, shown, mask)
+        given = self._given(one)
+        surface, lit = self._surface(one, given)
         if one.doubtful is not None:
             surface = _without(surface, one.doubtful)
-        steady = steadied(self.steady, surface, one.number, one.stood, _shown(seen), spare=self.solving.spare)
+        steady = steadied(self.steady, surface, one.number, one.stood, _shown(given.seen), spare=self.solving.spare)
         self.steady = None if self.one_by_one else steady
+        plates, shown, mask = given.plates, given.shown, given.mask
         made = passes_of(self.asked, plates, surface, lit, seen=shown, mask=mask) if self.asked.any else None
         return Instant(round=one, surface=surface, passes=made)
 
-    def _surface(
-        self,
-        one: Round,
-        plates: Sequence[Samples] | Sequence[Mixture],
-        seen: NDArray[np.bool_] | None,
-        mask: NDArray[np.bool_] | None,
-    ) -> tuple[Surface, Illumination]:
+    def look(self, one: Round) -> SubjectPoints | None:
+        """Return points of one round's subject, under near lights where its depth puts them."""
+        given = self._given(one)
+        lit = self._light(one)(ground=None) if self.near is None else self._surface(one, given)[1]
+        return self.solving.look(given.plates, lit, seen=given.shown, mask=given.mask)
+
+    def _given(self, one: Round) -> _Given:
+        whole = all(plate.seen.ndim == 1 for plate in one.plates)
+        seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
+        return _Given(
+            plates=_pictures(one, self.shares),
+            seen=seen,
+            shown=None if seen.all() else seen,
+            mask=None if self.masks is None else self.masks.at(one.number),
+        )
+
+    def _scaled(self, one: Round) -> list[Light]:
+        return [per_saturation(light, plate.saturation) for light, plate in zip(self.lights, one.plates, strict=True)]
+
+    def _light(self, one: Round) -> Callable[..., Illumination]:
+        return partial(illumination, self._scaled(one), channels=1 if len(one.plates[0].shape) == 2 else 3)
+
+    def _surface(self, one: Round, given: _Given) -> tuple[Surface, Illumination]:
         """Return a round's surface, and the light that it was solved with in the end: near lights' changes on the way
         as the surface is found."""
-        scaled = [per_saturation(light, plate.saturation) for light, plate in zip(self.lights, one.plates, strict=True)]
-        light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
+        plates, seen, mask, light = given.plates, given.shown, given.mask, self._light(one)
         unsure = _unsure(one, self.shares)
         moves = None if one.motion is None else one.motion.moves
-        here = None if self.near is None else swept(self.near.at(one.number), scaled, plates, seen=seen)
+        here = None if self.near is None else swept(self.near.at(one.number), self._scaled(one), plates, seen=seen)
         lit = light(ground=None if here is None else here.ground)
 
         def solve(found: Illumination) -> Surface:

@@ -1,6 +1,7 @@
 """A take in, the surface at one instant after the other out: decoding, plates, alignment and solving in one stream."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,8 @@ from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
-from psvideo.solve.instants import Instant, surfaces
+from psvideo.plates.spread import rounds_spread
+from psvideo.solve.instants import Instant, subject_of, surfaces
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
 from psvideo.sync.take_timing import find_take_timing
@@ -85,7 +87,10 @@ def solve(
     plan, clip = take.plan, take.clip
     lights = lights_as_planned(rig, plan)
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
-    rounds = gather(take, found, aligning=Aligning(align=align), with_ambient=False, watch=watch)
+    aligning, masks = Aligning(align=align), None if mask is None else Masks(still=mask)
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
-    masks = None if mask is None else Masks(still=mask)
+    if solving.looks_at_subject(len(lights)):
+        few = rounds_spread(take, found, aligning=aligning, watch=watch)
+        solving = replace(solving, subject=subject_of(few, plan, rig, masks=masks, solving=solving, near=near))
+    rounds = gather(take, found, aligning=aligning, with_ambient=False, watch=watch)
     return surfaces(rounds, plan, rig, masks=masks, solving=solving, near=near)

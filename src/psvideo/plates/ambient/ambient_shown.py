@@ -113,6 +113,17 @@ def ambient_before(take: Take, timing: Timing, index: int) -> Ambient | None:
     return ambient
 
 
+def ambient_near(take: Take, timing: Timing, index: int) -> Ambient | None:
+    """Return what the last dark slot before a flash shows by itself, None where there is none; without dark slots what
+    the window of frames around it shows."""
+    dark = [flash.index for flash in used_of(take, timing).flashes if flash.complete and flash.is_dark]
+    slots = not all(flash.lit for flash in take.plan.flashes)
+    if slots and not (before := [one for one in dark if one < index]):
+        return None
+    plate = next(ambient_shown(take, timing, None, after=(before[-1] if slots else index) - 1), None)
+    return None if plate is None else update(None, plate, ripple=ripple_of(take, timing))
+
+
 def ripple_of(take: Take, timing: Timing) -> Ripple | None:
     """Return the ripple that dark slots hold; what windows of frames show in their place is a mean over it."""
     return None if all(flash.lit for flash in take.plan.flashes) else timing.mains

@@ -12,6 +12,7 @@ from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.sequences.tags import Tags
 from psvideo.model.choices import Solver
 from psvideo.model.plan import Plan
+from psvideo.model.surface import Subject
 from psvideo.model.timing import Timing
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.align.rounds import Aligning
@@ -54,7 +55,10 @@ class OverTime:
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What all pieces of a run have in common: the take and its timing, what it is solved with, what is delivered."""
+    """What all pieces of a run have in common: the take and its timing, what it is solved with, what is delivered.
+
+    ``subject`` is what its rounds share, None where nobody looked yet or each round is by itself.
+    """
 
     take: Take
     timing: Timing
@@ -64,6 +68,7 @@ class Job:
     over_time: OverTime = field(default_factory=OverTime)
     fill: bool = True
     start_number: int = FIRST_NUMBER
+    subject: Subject | None = None
 
     @property
     def solving(self) -> Solving:
@@ -74,6 +79,7 @@ class Job:
             residual="residual" in self.delivery.aovs,
             error="error" in self.delivery.aovs,
             fill=self.fill,
+            subject=self.subject,
         )
 
     @property

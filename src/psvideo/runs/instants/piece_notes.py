@@ -14,6 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
+from psvideo.model.surface import Reflectance, Subject
 from psvideo.model.timing import Timing
 from psvideo.report.observe.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
@@ -24,7 +25,7 @@ from psvideo.runs.instants.job import Found
 
 FOLDER = ".pieces"
 """In the folder that a run writes, until it is whole."""
-TIMING = "timing.json"
+TIMING, SUBJECT = "timing.json", "subject.json"
 BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
@@ -79,6 +80,25 @@ def noted_timing(folder: Path) -> Timing | None:
         record = json.loads(path.read_text(encoding="utf-8"))
         timing = parse_timing(json.loads(record["timing"]), source=str(path))
         return replace(timing, **{name: record[name] for name in BESIDE_TIMING[:2]}, notes=tuple(record["notes"]))
+    except (OSError, ValueError, KeyError, TypeError) as fault:
+        raise PsvideoError(f"{path}: cannot be read ({fault}). {_ADVICE}") from fault
+
+
+def note_subject(folder: Path, subject: Subject) -> None:
+    """Note what all pieces take the subject for, unless one did before."""
+    path = folder / FOLDER / SUBJECT
+    if not path.is_file():
+        write_text(path, json.dumps({"reflectance": subject.reflectance}))
+
+
+def noted_subject(folder: Path) -> Subject | None:
+    """Return the subject that pieces noted, None where none did. Raises PsvideoError where its file is damaged."""
+    path = folder / FOLDER / SUBJECT
+    if not path.is_file():
+        return None
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))["reflectance"]
+        return Subject(reflectance=None if known is None else Reflectance(*map(float, known)))
     except (OSError, ValueError, KeyError, TypeError) as fault:
         raise PsvideoError(f"{path}: cannot be read ({fault}). {_ADVICE}") from fault
 

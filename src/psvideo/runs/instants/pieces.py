@@ -8,7 +8,7 @@ after. All else comes from the clip's first instant and from earlier dark slots.
 
 import shutil
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -28,9 +28,9 @@ from psvideo.plates.part import Part
 from psvideo.plates.sequence import POOLED_ROUNDS, round_numbers
 from psvideo.plates.several_lights.unmixed import slot_names
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece
-from psvideo.runs.instants.piece_notes import FOLDER, note_timing, noted, write_notes
+from psvideo.runs.instants.piece_notes import FOLDER, note_subject, note_timing, noted, noted_subject, write_notes
 from psvideo.runs.instants.reporting import observing
-from psvideo.runs.instants.solving import beginning_of, write_instants
+from psvideo.runs.instants.solving import beginning_of, knowing_subject, write_instants
 
 BESIDE = 3
 """Rounds on either side that aligning looks at: two, and one that the cut leaves incomplete."""
@@ -69,6 +69,7 @@ def write_piece(job: Job, folder: Path, piece: str, *, watch: Watch = unwatched)
     """Solve one piece into a folder that is not finished, and note what it found; return that."""
     numbers = piece_named(piece, Succession(job).numbers)
     note_timing(folder, job.timing)
+    job = _knowing_subject(job, folder, watch=watch)
     return _written(job, folder, numbers, beginning_of(job) if numbers else None, watch=watch)
 
 
@@ -81,6 +82,7 @@ def pieced_together(job: Job, folder: Path, *, watch: Watch = unwatched) -> Foun
     """Solve what no piece has solved yet, and return what all of them found."""
     done = [numbers for numbers, found in noted(folder) if _is_there(job, folder, found)]
     missing = [*_missing(Succession(job).numbers, done)]
+    job = _knowing_subject(job, folder, watch=watch) if missing else job
     beginning = beginning_of(job) if missing else None
     for numbers in missing:
         _written(job, folder, numbers, beginning, watch=watch)
@@ -96,6 +98,16 @@ def pieced_together(job: Job, folder: Path, *, watch: Watch = unwatched) -> Foun
 def forget_pieces(folder: Path) -> None:
     """Remove what pieces noted, once all is done."""
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
+
+
+def _knowing_subject(job: Job, folder: Path, *, watch: Watch) -> Job:
+    """Return the job with what all rounds share of their subject, as the first piece found and noted it."""
+    job = replace(job, subject=noted_subject(folder))
+    if job.subject is None:
+        job = knowing_subject(job, spare=folder, watch=watch)
+    if job.subject is not None:
+        note_subject(folder, job.subject)
+    return job
 
 
 def _is_there(job: Job, folder: Path, found: Found) -> bool:

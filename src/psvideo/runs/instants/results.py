@@ -26,7 +26,7 @@ from psvideo.runs.instants.job import Found, Job
 from psvideo.runs.instants.pieces import forget_pieces, pieced_together, pieces_begun, write_piece
 from psvideo.runs.instants.plates import nothing_complete
 from psvideo.runs.instants.reporting import Solved, run_report, write_report
-from psvideo.runs.instants.solving import write_instants
+from psvideo.runs.instants.solving import knowing_subject, write_instants
 from psvideo.runs.steps.output import Output, begun_by, folder_of
 from psvideo.solve.depth import scale_note
 from psvideo.solve.instants import Instant
@@ -62,6 +62,7 @@ def normals_run(
         if pieces_begun(folder):
             found = pieced_together(job, folder, watch=watch)
         else:
+            job = knowing_subject(job, spare=folder, watch=watch)
             found = write_instants(job, folder, resume=output.resume, watch=watch, picture_of=picture_of, beside=beside)
         result = finished(job, folder, output, found, watch=watch)
         forget_pieces(folder)

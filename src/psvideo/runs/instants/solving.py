@@ -12,6 +12,7 @@ from psvideo.compute.threads import MOST_WAITING, writing
 from psvideo.export.sequences.result_files import is_written
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
+from psvideo.plates.spread import rounds_spread
 from psvideo.report.observe.observed import Observed
 from psvideo.runs.delivery.delivering import surface_job, write_plates, write_specular
 from psvideo.runs.delivery.look import instant_sheet
@@ -20,7 +21,7 @@ from psvideo.runs.instants.depths import shape_of
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece, Pixels
 from psvideo.runs.instants.reporting import observing
 from psvideo.solve.depth import kept_beside, reservations
-from psvideo.solve.instants import Instant, denoised, surfaces
+from psvideo.solve.instants import Instant, denoised, subject_of, surfaces
 
 SPECULAR_OF_LIGHTS = "specular_of_lights"
 """The folder of what exceeds the diffuse model under each light, sequences as those of the plates."""
@@ -131,6 +132,25 @@ def instants_of(
         one_by_one=job.over_time.aligning.align == "none",
     )
     return found if job.over_time.denoise < 2 else denoised(found, job.over_time.denoise)
+
+
+def knowing_subject(job: Job, *, spare: Path | None = None, watch: Watch = unwatched) -> Job:
+    """Return the job with what its rounds share of their subject, unless that is known or nothing would use it: found
+    from a few rounds that are spread over the take, whichever part of it is solved. Decodes their frames."""
+    take, aligning = job.take, job.over_time.aligning
+    if job.subject is not None or not job.solving.looks_at_subject(len(take.plan.lights)):
+        return job
+    rounds = rounds_spread(take, job.timing, aligning=aligning, start_number=job.start_number, watch=watch)
+    subject = subject_of(
+        rounds,
+        take.plan,
+        job.lighting.rig,
+        masks=job.lighting.masks,
+        solving=replace(job.solving, spare=spare),
+        near=job.lighting.near,
+        falloff=job.lighting.falloff,
+    )
+    return replace(job, subject=subject)
 
 
 def beginning_of(job: Job) -> Beginning | None:

@@ -8,13 +8,15 @@ from typing import Literal
 import numpy as np
 
 from psvideo.model.choices import Solver
-from psvideo.model.surface import Surface
+from psvideo.model.surface import Subject, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.plate_noise import PlateNoise, noise_of
 from psvideo.solve.normals.robust import huber1981
+from psvideo.solve.normals.robust.reflectance import LEAST_LIGHTS
+from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
 from psvideo.solve.normals.trust.indirect import IndirectLook
@@ -38,7 +40,8 @@ class Solving:
     """``solver`` "auto" is robust from ROBUST_FROM_LIGHTS lights on. ``half`` gives half floats; ``residual`` and
     ``error`` ask for what the surface may hold as well. ``fill`` gives every pixel of the subject a normal. ``spare``
     is a folder in whose files large pictures are worked on; without one they lie in memory. ``grid_px``: at most this
-    many points along the longer side say how far normals may be off."""
+    many points along the longer side say how far normals may be off. ``subject`` is what a take's rounds share; without
+    it every round finds its own."""
 
     solver: Solver = "auto"
     half: bool = False
@@ -47,12 +50,17 @@ class Solving:
     fill: bool = True
     spare: Path | None = None
     grid_px: int = GRID_PX
+    subject: Subject | None = None
 
     def method(self, lights: int) -> Method:
         """Return the solver for this many lights."""
         if self.solver == "auto":
             return "robust" if lights >= ROBUST_FROM_LIGHTS else "least-squares"
         return self.solver
+
+    def looks_at_subject(self, lights: int) -> bool:
+        """Return whether so many lights show what a subject reflects beyond n . l, to a solver that uses it."""
+        return lights >= LEAST_LIGHTS and self.method(lights) == "robust"
 
     def solve(
         self,
@@ -79,6 +87,19 @@ class Solving:
         del solved  # residuals that nobody asked for are gone with it
         whole = filled(known, one, solved=valid, noise=noise.dark) if self.fill else emptied(known)
         return with_unchecked(whole, one, noise)
+
+    def look(
+        self, plates: Plates, lit: Illumination, *, seen: Mask | None = None, mask: Mask | None = None
+    ) -> SubjectPoints | None:
+        """Return points from which the subject's reflectance is found, None where it is not looked at or shows none."""
+        if not self.looks_at_subject(len(plates)):
+            return None
+        noise = noise_of(plates, lit)
+        usable = _usable(noise, lit.intensities.shape[1], "robust")
+        return huber1981.look(
+            plates, lit, seen=seen, mask=mask, usable=usable, reweighting=EVERYTHING, plate_noise=noise,
+            spare=self.spare,
+        )  # fmt: skip
 
     def measured(
         self,
@@ -129,6 +150,7 @@ class Solving:
                 residual=self.residual,
                 usable=usable,
                 reweighting=EVERYTHING,
+                subject=self.subject,
                 plate_noise=noise,
                 spare=self.spare,
                 looks=looks,

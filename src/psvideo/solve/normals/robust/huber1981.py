@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.surface import Misfit, Surface
+from psvideo.model.surface import Misfit, Subject, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.robust.reflectance import reflectance_of
+from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
+from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting, limit_deg, weights
 from psvideo.solve.normals.task import (
     FEW,
@@ -58,6 +59,7 @@ def solve(
     residual: bool = True,
     error: bool = True,
     misfit: Misfit | None = None,
+    subject: Subject | None = None,
     plate_noise: PlateNoise | None = None,
     spare: Path | None = None,
     looks: Looks | None = None,
@@ -66,8 +68,9 @@ def solve(
     """Return the surface that explains most of the plates, one per light.
 
     Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error as well. ``misfit`` is
-    what is typical of the picture; left out, it is found first, from a sample of the picture's rows. Where
-    ``plate_noise`` is known, what plain least squares explains to the noise is left to it: nothing is better there.
+    what is typical of the picture; left out, it is found first, from a sample of the picture's rows. ``subject`` is
+    what rounds of a take share; left out, it is found from these plates alone. Where ``plate_noise`` is known, what
+    plain least squares explains to the noise is left to it: nothing is better there.
 
     Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
     highlight is left out; three are taken as they are, and nothing shows whether one of them is a highlight.
@@ -80,29 +83,17 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    shown = ShownPlates.of(plates)
-    check_arrays(shown.samples, lit, seen, mask)
-    shown = shown.as_floats()  # one kind of samples, and so one loop to compile
-    (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
-    solution = _Solution(
-        shown=shown,
-        given=_balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale)),
-        result=empty_result(rows * cols, channels, half=half, residual=residual, spare=spare),
-        predicted=planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare),
-        half=half,
-        residual=residual,
-        threads=threads,
+    solution = _Solution.of(
+        plates, lit, seen, mask, usable, black_level, scale, half=half, residual=residual, spare=spare, threads=threads
     )
-    noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
-    if plate_noise is not None:
-        reweighting = replace(reweighting, noise=reweighting.noise * plate_noise.dimness)
+    noise, reweighting = _noise_of(plate_noise, solution), _dimmed(reweighting, plate_noise)
     if misfit is None:
         found, misfit, step = _first_look(solution, reweighting, noise)
-        if misfit is not None:
-            model = reflectance_of(
-                plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale
-            )
-            misfit = replace(misfit, reflectance=model)
+        if misfit is not None and subject is None:
+            points = points_of(plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale)
+            subject = Subject(reflectance=None if points is None else reflectance_of([points]))
+        if misfit is not None and subject is not None:
+            misfit = replace(misfit, reflectance=subject.reflectance)
     model = None if misfit is None else misfit.reflectance
     how = weights(
         reweighting,
@@ -116,6 +107,29 @@ def solve(
     return replace(solution.surface(error=error), misfit=misfit)
 
 
+def look(
+    plates: Sequence[Samples] | Sequence[Mixture],
+    lit: Illumination,
+    *,
+    seen: Mask | None = None,
+    mask: Mask | None = None,
+    usable: Usable = USABLE,
+    reweighting: Reweighting = Reweighting(),
+    plate_noise: PlateNoise | None = None,
+    spare: Path | None = None,
+) -> SubjectPoints | None:
+    """Return points of the subject, as ``solve`` finds its reflectance from; None where they or the lights are too few.
+
+    Arguments are those of ``solve``.
+    """
+    solution = _Solution.of(plates, lit, seen, mask, usable, 0.0, 1.0, half=False, residual=False, spare=spare)
+    noise, reweighting = _noise_of(plate_noise, solution), _dimmed(reweighting, plate_noise)
+    found, misfit, step = _first_look(solution, reweighting, noise)
+    if misfit is None:
+        return None
+    return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Solution:
     """A picture's task, and where its solution and ``predicted`` errors (pixel,) go as the loops run over its rows."""
@@ -127,6 +141,27 @@ class _Solution:
     half: bool
     residual: bool
     threads: int | None
+
+    @classmethod
+    def of(
+        cls, plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, seen: Mask | None, mask: Mask | None,
+        usable: Usable, black_level: float, scale: float,
+        *, half: bool, residual: bool, spare: Path | None, threads: int | None = None,
+    ) -> "_Solution":  # fmt: skip
+        """Make room for the solution of plates; arguments are those of ``solve``."""
+        shown = ShownPlates.of(plates)
+        check_arrays(shown.samples, lit, seen, mask)
+        shown = shown.as_floats()  # one kind of samples, and so one loop to compile
+        (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
+        return cls(
+            shown=shown,
+            given=_balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale)),
+            result=empty_result(rows * cols, channels, half=half, residual=residual, spare=spare),
+            predicted=planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare),
+            half=half,
+            residual=residual,
+            threads=threads,
+        )
 
     def run(
         self,
@@ -163,6 +198,19 @@ class _Solution:
     def surface(self, *, error: bool = True) -> Surface:
         """Return what was solved as a surface, in the same memory."""
         return surface_of(self.result, self.predicted if error else None, self.shown.shape, half=self.half)
+
+
+def _noise_of(plate_noise: PlateNoise | None, solution: _Solution) -> tuple[float, float]:
+    """Return the variance of the channels' combined noise in the dark, and per unit of light; 0 where unknown."""
+    channels = len(solution.result.albedo)
+    return (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
+
+
+def _dimmed(reweighting: Reweighting, plate_noise: PlateNoise | None) -> Reweighting:
+    """Return the settings with the least noise of a picture whose light is as little as is known of it."""
+    if plate_noise is None:
+        return reweighting
+    return replace(reweighting, noise=reweighting.noise * plate_noise.dimness)
 
 
 def _first_look(

@@ -10,7 +10,7 @@ from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import rows_of
-from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, Values, fitted
+from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, Values, fitted, joined
 from psvideo.solve.normals.task import Mask, Samples, Usable
 
 LEAST_LIGHTS = 5
@@ -18,12 +18,18 @@ ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800
 """The model is fitted to this many points of this many rows, to fewer under many lights."""
 
 
-def reflectance_of(
+def reflectance_of(looks: Sequence[SubjectPoints]) -> Reflectance | None:
+    """Return what a subject reflects beyond n . l, from one look at it or several; None where that explains little of
+    what is left over."""
+    return fitted(joined(looks)) if looks else None
+
+
+def points_of(
     plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, found: Surface, usable: Usable,
     *, step: int, seen: Mask | None, black_level: float, scale: float,
-) -> Reflectance | None:  # fmt: skip
-    """Return what a subject solved in every ``step``-th row reflects beyond n . l; None where that explains little of
-    what is left over, or the lights are too few. Arguments are those of ``huber1981.solve``."""
+) -> SubjectPoints | None:  # fmt: skip
+    """Return points of a subject solved in every ``step``-th row; None where they or the lights are too few. Arguments
+    are those of ``huber1981.solve``."""
     if len(plates) < LEAST_LIGHTS:
         return None
     solved = np.arange(0, found.valid.shape[0], step)
@@ -37,9 +43,9 @@ def reflectance_of(
     at = (rows[where[chosen]], cols[chosen])
     samples = np.stack([rows_of(plate, rows)[where[chosen], cols[chosen]] for plate in plates]).astype(np.float64)
     here = np.ones(samples.shape[:2], bool) if seen is None else _seen(seen, at)
-    points = _points((samples - black_level) * scale, lit, at, here, usable)
     normals = found.normals[at].astype(np.float64)
-    return fitted(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return _points((samples - black_level) * scale, lit, at, here, usable, normals)
 
 
 def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:
@@ -47,8 +53,9 @@ def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:
 
 
 def _points(
-    samples: Values, lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Mask, usable: Usable
-) -> SubjectPoints:
+    samples: Values, lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Mask, usable: Usable,
+    normals: Values,
+) -> SubjectPoints:  # fmt: skip
     samples = samples.reshape(*samples.shape[:2], -1)
     sent = _sent(lit, at)
     size = np.linalg.norm(sent, axis=-1)
@@ -62,7 +69,11 @@ def _points(
     half = towards + np.array([0.0, 0.0, 1.0])
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
     return SubjectPoints(
-        measured=measured, counts=(here & (measured > least)).astype(float), towards=towards, half=half
+        measured=measured,
+        counts=(here & (measured > least)).astype(float),
+        towards=towards,
+        half=half,
+        normals=normals,
     )
 
 

@@ -9,6 +9,7 @@ towards the light is r = c max(l . v - c n . v, 0) / max(c, n . v), with v to th
 "Generalization of Lambert's reflectance model", 1994, without their angles.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,12 +55,14 @@ LEAST_SHARE = 0.01
 @dataclass(frozen=True, kw_only=True)
 class SubjectPoints:
     """Points of the subject: measurements (light, point) in units of every light's strength, which of them count
-    (0 or 1), directions to the lights (light, point, 3), and half way from there to the camera."""
+    (0 or 1), directions to the lights (light, point, 3), and half way from there to the camera; and ``normals``
+    (point, 3) as the points were solved without a model."""
 
     measured: Values
     counts: Values
     towards: Values
     half: Values
+    normals: Values
 
     def only(self, known: Mask) -> "SubjectPoints":
         """Return some of the points."""
@@ -68,17 +71,31 @@ class SubjectPoints:
             counts=self.counts[:, known],
             towards=self.towards[:, known],
             half=self.half[:, known],
+            normals=self.normals[known],
         )
 
 
-def fitted(points: SubjectPoints, normals: Values) -> Reflectance | None:
+def joined(looks: Sequence[SubjectPoints]) -> SubjectPoints:
+    """Return the points of one or several looks at a subject under the same lights."""
+    if len(looks) == 1:
+        return looks[0]
+    return SubjectPoints(
+        measured=np.concatenate([one.measured for one in looks], axis=1),
+        counts=np.concatenate([one.counts for one in looks], axis=1),
+        towards=np.concatenate([one.towards for one in looks], axis=1),
+        half=np.concatenate([one.half for one in looks], axis=1),
+        normals=np.concatenate([one.normals for one in looks]),
+    )
+
+
+def fitted(points: SubjectPoints) -> Reflectance | None:
     """Return the model that explains the points best, solved with their normals in turn; of FOR_SHINE lights or more
     any, of fewer that of rough surfaces alone."""
-    cosines = np.maximum((points.towards * normals).sum(axis=-1), 0.05)
+    cosines = np.maximum((points.towards * points.normals).sum(axis=-1), 0.05)
     sizes = _medians(points.measured / cosines, points.counts > 0)
     known = sizes > 0
     points = points.only(known)
-    g = normals[known] * sizes[known, None]
+    g = points.normals * sizes[known, None]
     if len(g) < LEAST_POINTS:
         return None
     typical = median(sizes[known])
