@@ -154,9 +154,10 @@ def _likeliest(spokes: Spokes, free: int, *, coarse: bool = True) -> FloatArray:
         first, exact = max(width_px / 3, 0.3), max(width_px / 50, 2e-3)
 
         def unlikely(moved: FloatArray, odds: FloatArray = odds) -> float:
-            at = spokes.slopes @ (moved * scale)
-            unusual = _unusual(spokes.around + np.pad(moved * scale, (0, 5 - free)))
-            return float(unusual - looked_up(odds, at, spokes.most_px).sum())
+            step = moved * scale
+            place = spokes.around.copy()
+            place[:free] += step
+            return float(_unusual(place) - looked_up(odds, spokes.slopes @ step, spokes.most_px).sum())
 
         simplex = np.vstack([found, found + first * np.eye(free)])
         options = {"xatol": exact, "fatol": exact, "maxiter": 1200, "initial_simplex": simplex}
@@ -193,8 +194,10 @@ def _likely_apart(spokes: Spokes, place: FloatArray, free: int) -> FloatArray:
         root = np.linalg.cholesky(2 * covariance + np.diag((0.05 * scale) ** 2))
         drawn = middle + normal @ root.T
         at = (drawn - spokes.around[:free]) @ spokes.slopes.T
-        odds = np.array([looked_up(spokes.odds, one, spokes.most_px).sum() for one in at]) * SECTORS / len(spokes.odds)
-        odds -= [_unusual(np.pad(one, (0, 5 - free))) for one in drawn]
+        odds = looked_up(spokes.odds, at, spokes.most_px).sum(axis=1) * SECTORS / len(spokes.odds)
+        places = np.zeros((DRAWS, 5))
+        places[:, :free] = drawn
+        odds -= [_unusual(one) for one in places]
         odds += 0.5 * (normal**2).sum(axis=1)
         share = np.exp(odds - odds.max())
         share /= share.sum()

@@ -117,11 +117,13 @@ def widened(odds: FloatArray, width_px: float) -> FloatArray:
 
 
 def looked_up(odds: FloatArray, shift_px: FloatArray, most_px: float) -> FloatArray:
-    """Return odds at one shift per spoke, between the ones tried; beyond them, of a spoke that is misled."""
+    """Return odds at one shift per spoke, (spoke,) or (outline, spoke), between the ones tried; beyond them, of a spoke
+    that is misled."""
+    shifts = odds.shape[1]
     at = (shift_px + most_px) / SHIFT_PX
-    low = np.clip(at.astype(np.intp), 0, odds.shape[1] - 2)
-    share = np.clip(at - low, 0, 1)
-    spoke = np.arange(len(odds))
-    between: FloatArray = odds[spoke, low] * (1 - share) + odds[spoke, low + 1] * share
+    low = np.minimum(np.maximum(at.astype(np.intp), 0), shifts - 2)  # np.clip takes longer than all the rest
+    share = np.minimum(np.maximum(at - low, 0.0), 1.0)
+    flat = np.arange(0, odds.size, shifts) + low
+    between: FloatArray = odds.take(flat) * (1 - share) + odds.take(flat + 1) * share
     beyond: NDArray[np.bool_] = np.abs(shift_px) > most_px
     return np.where(beyond, np.log(MISLED), between)
