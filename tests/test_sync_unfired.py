@@ -74,6 +74,7 @@ def test_a_light_that_dies_is_named_from_when_it_does(share: float, plan: Plan) 
     assert held_against(plan, shot, timing) == fired
     [note] = [note for note in timing.notes if "never fired" in note]
     assert note.startswith(plan.flashes[slot].lit[0])
+    assert not any("exposure or gain" in note for note in timing.notes)
 
 
 def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(plan: Plan) -> None:

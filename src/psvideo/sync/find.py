@@ -27,7 +27,7 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import may_restart
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.turns import turns
-from psvideo.sync.unfired import remarks_on_unfired, without_unfired
+from psvideo.sync.unfired import only_fired, remarks_on_unfired, without_unfired
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
@@ -126,15 +126,15 @@ def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
         clip=take.clip,
         dropped=_all_dropped(take.dropped, take.numbers, take.indices, found.track.index),
         repeated=tuple(int(number) for number in take.numbers[found.track.repeated]),
-        notes=(
-            *remarks(plan, found),
-            *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
-            *remarks_on_frames(plan, found, take.indices),
-        ),
     )
     fired = without_unfired(plan, found, timing.flashes)
-    unfired = remarks_on_unfired(found, timing.flashes, fired, take.numbers)
-    return replace(timing, flashes=fired, notes=(*timing.notes, *unfired))
+    notes = (
+        *remarks(plan, found, steady=only_fired(found, timing.flashes, fired)),
+        *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
+        *remarks_on_frames(plan, found, take.indices),
+        *remarks_on_unfired(found, timing.flashes, fired, take.numbers),
+    )
+    return replace(timing, flashes=fired, notes=notes)
 
 
 def check_first_light(plan: Plan, first_light: str | None) -> None:

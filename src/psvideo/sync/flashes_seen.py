@@ -35,9 +35,8 @@ def timing_of_fit(
     clip: str,
     dropped: tuple[DroppedFrames, ...],
     repeated: tuple[int, ...],
-    notes: tuple[str, ...],
 ) -> Timing:
-    """List every flash that the clip saw any of, and mark those that its start or end cuts."""
+    """List every flash that the clip saw any of, and mark those that its start or end cuts; no notes yet."""
     beat, index = found.fit.beat, found.rows.index
     camera = fitted_camera(plan, found.fit)
     span = int(index[0]), int(index[-1])
@@ -56,7 +55,6 @@ def timing_of_fit(
         order=order,
         dropped_frames=dropped,
         repeated_frames=repeated,
-        notes=notes,
         phase_error_s=found.fit.shift_error_s,
         row_time_error_s=found.fit.errors_s.get("row_time_s"),
         flashes=flashes,

@@ -205,11 +205,31 @@ def _solved(design: FloatArray, value: FloatArray) -> FloatArray:
     return found
 
 
+def only_fired(found: ClipFit, flashes: Sequence[Flash], fired: Sequence[Flash]) -> ClipFit:
+    """Return the fit with only those frames that saw nothing of the complete ``flashes`` that never ``fired``: their
+    light says nothing of the camera's exposure."""
+    lost = _lost(flashes, fired)
+    if not lost:
+        return found
+    first = _first_frame(found, np.array([flash.start_s for flash in lost]))
+    saw = (first[:, None] + np.arange(TOUCHED)).ravel()
+    rows, fit, kept = found.rows, found.fit, ~np.isin(found.rows.index, saw)
+    if not kept.any():
+        return found
+    doubt = None if rows.doubt is None else rows.doubt[kept]
+    rows = replace(rows, value=rows.value[kept], index=rows.index[kept], doubt=doubt).one_window()
+    return replace(found, rows=rows, fit=replace(fit, rest=fit.rest[kept], weight=fit.weight[kept]))
+
+
+def _lost(flashes: Sequence[Flash], fired: Sequence[Flash]) -> list[Flash]:
+    return [one for one, other in zip(flashes, fired, strict=True) if one.complete and not other.complete]
+
+
 def remarks_on_unfired(
     found: ClipFit, flashes: Sequence[Flash], fired: Sequence[Flash], numbers: NDArray[np.int64]
 ) -> Iterator[str]:
     """Say which of a clip's complete ``flashes`` are not among those that ``fired``, by the frames' ``numbers``."""
-    lost = [one for one, other in zip(flashes, fired, strict=True) if one.complete and not other.complete]
+    lost = _lost(flashes, fired)
     for lit in dict.fromkeys(flash.lit for flash in lost):
         own = [flash for flash in lost if flash.lit == lit]
         first = _first_frame(found, np.array([flash.start_s for flash in own]))

@@ -39,14 +39,17 @@ MUCH = 0.5
 """Share of the times' error from which on its source is worth a word."""
 
 
-def remarks(plan: Plan, found: ClipFit) -> tuple[str, ...]:
-    """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given."""
+def remarks(plan: Plan, found: ClipFit, *, steady: ClipFit) -> tuple[str, ...]:
+    """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given.
+
+    ``steady`` is the fit with those frames only whose flashes all fired.
+    """
     beat = found.fit.beat
     said = [
         _clock(plan, found),
         _mixed(plan, beat),
         *_camera(plan, found),
-        _exposure(plan, found),
+        _exposure(plan, steady),
         _soft(found),
         _unsteady(found),
         _sureness(plan, found),
