@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bench.timing import against_truth
 from bench.timing_cases import Case, groups
-from bench.timing_scenes import plan_of, rolling_stripes
+from bench.timing_scenes import plan_of, rolling_stripes, tumbling
 
 from psvideo.errors import NoStrobeError
 from psvideo.model.rows.row_profiles import collect_with_doubt
@@ -38,6 +38,18 @@ def test_slow_leds_show_on_a_subject_that_tumbles_with_everything_else_unknown()
     assert timing.fall_s == pytest.approx(5e-5, rel=0.1)
     assert off_rows < 0.15
     assert off_rows < 3 * timing.phase_error_rows
+
+
+@pytest.mark.parametrize(("tail_rows", "seed"), [(0.09, 0), (0.09, 1), (0.35, 3)])
+def test_tails_that_the_plan_does_not_tell_are_found_or_claimed_before_a_subject_that_tumbles(
+    tail_rows: float, seed: int
+) -> None:
+    told = plan_of(durations_s=(0.0008,), height_px=48)
+    tail_s = tail_rows * told.camera.row_time_s
+    case = Case(plan=replace(told, rise_s=tail_s, fall_s=tail_s), claimed=told, scene=tumbling, frames=60, ambient=0.03)
+    timing, off_rows = timed(case, seed)
+    assert off_rows < 2 * timing.phase_error_rows
+    assert timing.phase_error_rows < 0.1
 
 
 @pytest.mark.parametrize("share", [0.3, pytest.param(0.5, marks=pytest.mark.campaign)])

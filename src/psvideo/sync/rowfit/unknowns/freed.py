@@ -103,7 +103,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     slow = fitted(plan, rows, fit.beat, (*free, *tails))
     gain = taken_away(plan, rows, fit, slow)
     if gain < SOFT or not _plausible(plan, slow.beat):
-        return Freed(fit=fit)
+        return Freed(fit=fit, unsure_s=_hidden_s(rows, fit, slow) if _may_hide_tails(plan, rows, fit) else 0.0)
     row_time_s = fit.beat.row_time_s
     if row_time_s == 0.0:
         return Freed(fit=slow if _clear(fit, slow, tails) and gain > SLOWER else fit)
@@ -120,6 +120,11 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
         return Freed(fit=taken, unsure_s=float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both))))
     doubt_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, both.beat), both.shift_error_s))
     return Freed(fit=fit, unsure_s=doubt_s, soft_s=max(slow.beat.rise_s, slow.beat.fall_s))
+
+
+def _hidden_s(rows: Profiles, fit: Fit, slow: Fit) -> float:
+    """Return by how much times are in doubt because tails that the picture does not show may be there all the same."""
+    return UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, slow.beat), _more_s(fit, slow)))
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
@@ -170,7 +175,7 @@ def _next(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], names: tu
     tails = tuple(name for name in names if name in TAILS)
     name = clearest(plan, rows, fit, free, names, at_least=LEAST_GAIN)
     if name is None:
-        return tails if tails and _softer(plan, rows, fit) else ()
+        return tails if tails and (_may_hide_tails(plan, rows, fit) or _softer(plan, rows, fit)) else ()
     return tails if name in TAILS else (name,)
 
 
@@ -181,9 +186,15 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
         tail_s = share * plan.shortest_flash_s
         beat = fit.beat.with_phase(fit.beat.clock.phase_s - tail_s)
         beat = replace(beat, rise_s=beat.rise_s + tail_s, fall_s=beat.fall_s + tail_s)
-        if robust_loss(rows, unexplained(plan, rows, beat), fit.rest) < limit:
+        if robust_loss(rows, unexplained(plan, rows, beat, fit.weight), fit.rest) < limit:
             return True
     return False
+
+
+def _may_hide_tails(plan: Plan, rows: Profiles, fit: Fit) -> bool:
+    """Return whether LEDs may rise and fall slowly without the picture or the plan telling it: the subject moves."""
+    told = max(plan.rise_s, plan.fall_s) > 0.0
+    return not told and (rows.restless is not None or gain_of(rows, fit.rest) < STILL)
 
 
 def _plausible(plan: Plan, beat: Beat) -> bool:
