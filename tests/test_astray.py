@@ -14,8 +14,8 @@ from psvideo.model.surface import Misfit
 from psvideo.model.timing import Timing
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import made
+from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.result import accuracy
-from psvideo.report.judge.time import motion
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.astray import Astray, astray
 from psvideo.report.observe.facts import InstantFacts

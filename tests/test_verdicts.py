@@ -18,7 +18,7 @@ from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round
-from psvideo.report.judge import result, time
+from psvideo.report.judge import of_motion, of_rows, of_timing, result
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
@@ -469,20 +469,20 @@ def test_even_ambient_light_over_an_even_card_is_no_black_level(shape: str, name
 
 
 def timed(**changed: Any) -> str:
-    return graded(list(time.timing_and_order(timing_of(**changed), "rolling")), "timing")
+    return graded(list(of_timing.timing_and_order(timing_of(**changed), "rolling")), "timing")
 
 
 def covered(subject: str, footage: Footage = GOOD, *, dark_s: float = 0.01, **changed: Any) -> str:
     """Return what is said of the rows of a rolling plan with this dark time."""
     plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
-    return graded(list(time.coverage(plan, timing_of(**changed), footage.observed(0))), subject)
+    return graded(list(of_rows.coverage(plan, timing_of(**changed), footage.observed(0))), subject)
 
 
 def moved(px_per_flash: float, *, aligned: bool = False) -> str:
     """Return what is said of paint that moves by so much from flash to flash of one light, a flash a second."""
     one = Footage(shape="waves", lights=1, rounds=4, shift_px=px_per_flash).observed(0)
     return graded(
-        time.motion(plan_of(one.lights, fps=1), timing_of(frame_period_s=1.0), one, aligned=aligned), "motion"
+        of_motion.motion(plan_of(one.lights, fps=1), timing_of(frame_period_s=1.0), one, aligned=aligned), "motion"
     )
 
 
@@ -503,13 +503,13 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
 
 def test_rows_whose_ambient_light_no_part_of_a_flash_tells_are_not_laid_to_the_shutter() -> None:
     plan, one = plan_of(["a"], mode="rolling", dark_s=0.01), Footage(unseen=0.1).observed(0)
-    (said,) = time.coverage(plan, timing_of(), one)
+    (said,) = of_rows.coverage(plan, timing_of(), one)
     assert said.grade == "doubtful"
     assert "dark slot" in said.advice
     assert "360" not in said.advice
-    assert graded(list(time.coverage(plan, timing_of(), one, take_s=5.0)), "rows") == "good"
+    assert graded(list(of_rows.coverage(plan, timing_of(), one, take_s=5.0)), "rows") == "good"
     dark = replace(plan, flashes=(*plan.flashes, replace(plan.flashes[0], lights={})))
-    assert "360" in next(time.coverage(dark, timing_of(), one)).advice
+    assert "360" in next(of_rows.coverage(dark, timing_of(), one)).advice
 
 
 def test_rows_that_the_rest_of_the_take_shows_are_not_lost_unless_the_strobe_keeps_step() -> None:
@@ -517,7 +517,9 @@ def test_rows_that_the_rest_of_the_take_shows_are_not_lost_unless_the_strobe_kee
 
     def said(dark_s: float, take_s: float | None) -> tuple[str, str]:
         plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
-        found = list(time.coverage(plan, timing_of(exposure_s=0.005), Footage(unseen=0.5).observed(0), take_s=take_s))
+        found = list(
+            of_rows.coverage(plan, timing_of(exposure_s=0.005), Footage(unseen=0.5).observed(0), take_s=take_s)
+        )
         return graded(found, "rows"), " ".join(f"{one.found} {one.advice}" for one in found)
 
     flash_s = plan_of(["a"], mode="rolling", dark_s=0.01).flashes[0].duration_s
@@ -554,7 +556,7 @@ def test_ambient_light_that_no_flash_freezes_is_said_with_its_blur_and_its_lean(
     timing = timing_of(frame_period_s=1.0, exposure_s=0.5, row_time_s=1.0 / SIZE)
     one = Footage(shape="waves", lights=1, rounds=4, shift_px=4).observed(0)
     one.facts[:] = [replace(facts, ambient=ambient) for facts in one.facts]
-    found = time.motion(plan, timing, one).found
+    found = of_motion.motion(plan, timing, one).found
     assert ("do not freeze the ambient light, 8 % of the signal" in found) == said
     speed_px_s = float(np.median([facts.speed_px_s or 0.0 for facts in one.facts[1:]]))
     assert not said or f"blurs by up to {0.5 * speed_px_s:.0f} px and leans by {speed_px_s:.0f} px" in found

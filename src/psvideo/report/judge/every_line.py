@@ -5,9 +5,11 @@ from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure
 from psvideo.report.judge.of_lamps import lamps
+from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
+from psvideo.report.judge.of_rows import coverage, in_step
+from psvideo.report.judge.of_timing import timing_and_order
 from psvideo.report.judge.result import accuracy, focus, steadiness, validity
-from psvideo.report.judge.time import coverage, in_step, motion, timing_and_order
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 

@@ -1,0 +1,93 @@
+"""Judgements on motion: how far things move from flash to flash, or whether photographs are aligned."""
+
+import numpy as np
+
+from psvideo.model.cost.motion_cost import cost_words
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.report.judge.of_ambient import NOTICED
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.astray import LEAST_SHOWN_PX
+from psvideo.report.observe.observed import Observed
+
+FAST_PX, LOST_PX = 1.0, 4.0
+"""Pixels from flash to flash: 1 costs about 1 degree, 4 cost 5 to 9."""
+FEW_MOVE, MUCH_CHANGES = 0.02, 0.1
+"""Shares of the picture: fewer that move fast spoil no take; more that change and cannot be followed do."""
+OFTEN = 0.9
+"""Motion is judged by what is reached in a tenth of the rounds."""
+LEAST_FOLLOWED = 0.5
+"""In a smaller share of the rounds a speed says nothing of the take."""
+
+
+def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False) -> Judgement:
+    """Judge how far the fastest parts move from flash to flash, and within one; ``opened``: under an open shutter."""
+    shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
+    speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
+    if not shares:
+        return _places(observed)
+    share = float(np.quantile(shares, OFTEN))
+    if len(speeds) < LEAST_FOLLOWED * len(shares):
+        return Judgement(
+            subject="motion",
+            grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
+            found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed, or "
+            "repeats itself meanwhile"
+            + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else ".")
+            + (" The open shutter shows the single flashes there, and no blur between them." if opened else ""),
+            advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers, or the "
+            "movie's coding changes the pictures.",
+        )
+    speed = float(np.quantile(speeds, OFTEN))
+    flash_s = timing.frame_period_s if plan.mode == "synced" else plan.cycle_s / len(plan.cycle_slots)
+    step_px = speed * flash_s
+    blur_px = speed * max(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    if plan.mode == "synced":
+        blur_px = step_px
+    if step_px <= FAST_PX:
+        still = "Nothing moves." if step_px < 0.01 else f"At most {step_px:.2f} px of motion from flash to flash."
+        return Judgement(subject="motion", grade="good", found=still)
+    grave = step_px > LOST_PX and share > FEW_MOVE and not aligned
+    return Judgement(
+        subject="motion",
+        grade="bad" if grave else "doubtful",
+        found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
+        f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}." + _unfrozen(plan, timing, observed, speed),
+        advice="Move slower, raise the frame rate or flash fewer lights"
+        + (", or leave `align` at auto, which brings the plates together." if not aligned else "."),
+    )
+
+
+def _places(observed: Observed) -> Judgement:
+    """Judge whether photographs of a still scene are aligned, where that can be told."""
+    found = observed.astray[0] if observed.astray else None
+    if found is None or (not found.shows and found.within_px > LEAST_SHOWN_PX):
+        return Judgement(
+            subject="motion", grade="unknown", found="Motion is not known: no two whole plates of one light in turn."
+        )
+    if not found.shows:
+        return Judgement(
+            subject="motion",
+            grade="good",
+            found=f"The pictures are aligned to within {max(found.within_px, 0.1):.1f} px.",
+        )
+    more = " or more" if found.typical_px > FAST_PX else ""
+    return Judgement(
+        subject="motion",
+        grade="doubtful",
+        found=f"The camera or the subject moved between the pictures: they lie about {found.typical_px:.1f} px{more} "
+        f"apart, that of {found.light!r} {found.most_px:.1f} px off. Edges and fine detail of the normals suffer.",
+        advice="Take them again from a tripod without touching the camera, or align the pictures first.",
+    )
+
+
+def _unfrozen(plan: Plan, timing: Timing, observed: Observed, speed_px_s: float) -> str:
+    """Say by how much ambient light, which flashes do not freeze, shows motion blurred and leaning, where it counts."""
+    shares = [one.ambient for one in observed.facts if one.ambient is not None]
+    if plan.mode == "synced" or not shares or float(np.median(shares)) < NOTICED:
+        return ""
+    blur_px, lean_px = speed_px_s * timing.exposure_s, speed_px_s * abs(timing.row_time_s) * plan.camera.height_px
+    return (
+        f" Flashes do not freeze the ambient light, {100 * float(np.median(shares)):.0f} % of the signal: in it what "
+        f"moves blurs by up to {blur_px:.0f} px and leans by {lean_px:.0f} px from the first row to the last."
+    )

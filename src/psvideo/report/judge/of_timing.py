@@ -1,0 +1,49 @@
+"""Judgements on the flashes: how certain their times are, and which light is which."""
+
+from collections.abc import Iterator
+
+from psvideo.model.timing import Timing
+from psvideo.report.judgement import Judgement
+
+SURE_ROWS, LOST_ROWS = 0.3, 2.0
+"""Standard errors of the flashes' times beyond which a take is doubtful, and bad."""
+
+
+def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
+    """Judge how certain the flashes' times and names are."""
+    rows = timing.phase_error_rows
+    if mode == "synced":
+        yield Judgement(
+            subject="timing", grade="good", found="One flash a frame, as the plan says: no time had to be found."
+        )
+    elif rows <= SURE_ROWS:
+        yield Judgement(
+            subject="timing",
+            grade="good",
+            found=f"Phase locked. {timing.how_sure} The clocks differ by {timing.clock_offset_ppm:+.1f} ppm.",
+        )
+    else:
+        yield Judgement(
+            subject="timing",
+            grade="bad" if rows > LOST_ROWS else "doubtful",
+            found=f"Flash times are known to {rows:.2f} row only: plates may be torn near the dark row.",
+            advice="Check that plan.toml is what the strobe played, and its transfer how the files code light: a wrong "
+            "curve looks like another exposure. Fix the exposure, and switch stabilisation off.",
+        )
+    if timing.order == "guess":
+        yield Judgement(
+            subject="order",
+            grade="doubtful",
+            found="Which light is which is a guess, so normals may be wrong everywhere."
+            + (f" {timing.order_note}" if timing.order_note else ""),
+            advice="Shoot with a dark slot as marker, or name the first light with `first_light`.",
+        )
+    else:
+        yield Judgement(subject="order", grade="good", found=ORDER[timing.order])
+
+
+ORDER = {
+    "marker": "Which light is which is known from the cycle's marker.",
+    "rig": "Which light is which is known from the rig's directions.",
+    "given": "Which light is which was given.",
+}
