@@ -182,12 +182,22 @@ def jpegs_called_png(folder: Path, _: Path) -> None:
         file.write_bytes(file.read_bytes() + file.name.encode())
 
 
+def all_alike(words: bytes) -> Spoil:
+    def spoil(folder: Path, _: Path) -> None:
+        for file in folder.iterdir():
+            file.write_bytes(words)
+
+    return spoil
+
+
 PHOTOGRAPHS: dict[str, tuple[Spoil, str]] = {
     "one picture only": (only("shot 3"), "holds 1 picture of lights (shot 3.png). Normals need three at least"),
     "two pictures": (only("shot 3", "shot 7"), "Normals need three at least, each under another light"),
     "as a phone saves them": (of_a_phone, "shot 20.HEIC (and 5 more) is HEIC, which is not read"),
     "every picture as JPEG too": (raw_and_jpeg, "shot 3.jpg and shot 3.png are one photograph in two kinds"),
     "one picture under two names": (one_twice, "shot 3.png and shot 7.png are one and the same picture"),
+    "copied as empty files": (all_alike(b""), "png: is empty"),
+    "a server's page for every picture": (all_alike(b"<html>not found</html>"), "does not begin like a PNG file"),
     "one picture for two lights": (
         of_one_picture,
         "shot 3.png: lights.lp gives it to light 1 (shot 3.png) and to light 2 (shot 3.png)",

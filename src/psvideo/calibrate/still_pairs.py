@@ -8,6 +8,7 @@ from pathlib import Path
 
 from psvideo.calibrate.light_files import bears, find_stills
 from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
+from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
@@ -97,7 +98,7 @@ def _refuse_other_than_pictures(*given: Path | None) -> None:
 
 
 def _refuse_few(folder: Path, files: Sequence[Path]) -> None:
-    """Raise PsvideoError where there are too few pictures, or one twice."""
+    """Raise PsvideoError where there are too few pictures, or one twice, or several that are none."""
     if len(files) < FEWEST:
         raise PsvideoError(
             f"{folder}: holds {len(files)} picture{'' if len(files) == 1 else 's'} of lights "
@@ -112,6 +113,7 @@ def _refuse_few(folder: Path, files: Sequence[Path]) -> None:
         with file.open("rb") as opened:
             first = seen.setdefault(hashlib.file_digest(opened, "sha256").hexdigest(), file)
         if first is not file:
+            read_header(KINDS[file.suffix.lower()], file)  # empty files, or a server's page of words, are no picture
             raise PsvideoError(
                 f"{folder}: {first.name} and {file.name} are one and the same picture. Expected a photograph of its "
                 "own for each light: copy the missing one from the camera, or take it again."
