@@ -1,11 +1,13 @@
 """Results at any instant: which instants a rate asks for, on paper, and what is delivered at them."""
 
 import sys
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,14 +27,18 @@ from psvideo.model.quantities import QUANTITIES
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
+from psvideo.plates.align import rounds
 from psvideo.plates.align.comb import comb_of, schedule_of
 from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.gather import gather
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.runs.delivery.relit import TILT, TURN_S, blur_of
+from psvideo.runs.instants import depths
 from psvideo.runs.steps.output import rate_of, sequence_fps
+from psvideo.solve.depth import depth_of
 
 PlanMaker = Callable[..., Plan]
 
@@ -216,6 +222,29 @@ def test_results_at_every_camera_frame_show_it_where_it_was_then(passing: Path, 
         assert np.median(u[inner]) == pytest.approx(PX_PER_FRAME, abs=0.3)
     with pytest.raises(UsageError, match="would be repeated"):
         ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "none", fps="frame", align="none")
+
+
+def test_depth_of_what_moves_is_integrated_before_the_next_instant_is_followed(
+    passing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Either takes as much memory as all else of a run: not at the same time."""
+    followed, integrated = [0], [0]
+
+    def integrating(*given: Any) -> Any:
+        assert threading.current_thread() is threading.main_thread(), "which cannot follow meanwhile"
+        depth = depth_of(*given)
+        integrated[0] += 1
+        return depth
+
+    def following(*given: Any) -> Any:
+        followed[0] += 1
+        assert integrated[0] == max(followed[0] - 2, 0), "the first is integrated in another way, to fix the scale"
+        return followed_at(*given)
+
+    monkeypatch.setattr(depths, "depth_of", integrating)
+    monkeypatch.setattr(rounds, "followed_at", following)
+    report = ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "out", aov=["depth", "motion"], preview=())
+    assert integrated[0] == len(report.instants) - 1 >= 2
 
 
 def test_a_part_of_the_frames_shows_the_same_instants_under_the_same_numbers(passing: Path, tmp_path: Path) -> None:

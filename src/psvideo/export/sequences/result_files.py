@@ -107,11 +107,12 @@ def write_surface(
     beauty: NDArray[np.floating] | None = None,
     age_s: NDArray[np.float64] | None = None,
     passes: Passes | None = None,
-    motion: NDArray[np.floating] | None = None,
+    motion: Callable[[], NDArray[np.floating]] | None = None,
 ) -> None:
     """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs and meshes asked for.
 
-    ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``, ``beauty`` where it is an AOV.
+    ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``, ``beauty`` and ``motion``, which
+    makes the vectors, where they are AOVs.
     """
     shape = _integrated(depth) if delivery.needs_depth else None
     if shape is not None:
@@ -123,7 +124,7 @@ def write_surface(
         depth=shape,
         age_s=age_s,
         passes=passes or Passes(),
-        motion=motion,
+        motion=None if motion is None else motion(),
         program=delivery.program,
     )
     _write_pictures(folder, clip, number, time_s, made, delivery=delivery, tags=tags)

@@ -15,6 +15,7 @@ from psvideo.export.sequences.plate_files import plate_name, write_light, write_
 from psvideo.export.sequences.result_files import Delivery, write_surface
 from psvideo.export.sequences.tags import Tags
 from psvideo.model.choices import Compression
+from psvideo.plates.align.velocity.moving import Followed
 from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.light_plate import LightPlate
@@ -79,7 +80,7 @@ def surface_job(
         beauty=beauty,
         age_s=age_s,
         passes=_whole_picture(instant.passes),
-        motion=_motion_of(one, tags.fps) if "motion" in delivery.aovs else None,
+        motion=partial(_motion_of, one.motion, one.plates[0].shape, tags.fps) if "motion" in delivery.aovs else None,
     )
     if "relit" not in delivery.previews:
         return written
@@ -93,9 +94,9 @@ def _in_turn(*jobs: Callable[[], None]) -> None:
         job()
 
 
-def _motion_of(one: Round, fps: Fraction) -> NDArray[np.float32]:
+def _motion_of(motion: Followed | None, shape: tuple[int, ...], fps: Fraction) -> NDArray[np.float32]:
     """Return where every pixel is a delivered frame later and earlier, x right and y up, (row, col, 4), in pixels."""
-    ahead = pixels_per_s(one.motion, one.plates[0].shape) * np.array([1 / fps, -1 / fps], np.float32)
+    ahead = pixels_per_s(motion, shape) * np.array([1 / fps, -1 / fps], np.float32)
     return np.concatenate([ahead, -ahead], axis=-1)
 
 

@@ -19,7 +19,8 @@ def shape_of(
 ) -> tuple[Shaping | None, Callable[[], Depth] | None]:
     """Return the clip's shaping, begun with its first instant, and what integrates this one when it is called.
 
-    Both are None where no depth is asked for. The first instant's depth is there already and not found twice.
+    Both are None where no depth is asked for. The first instant's depth is there already and not found twice. Where
+    something moves, so is this one's: following the next round takes as much memory as integrating, on both cores.
     """
     if shaping is None:
         return None, None
@@ -28,7 +29,11 @@ def shape_of(
     if shaping.first is None:
         shaping = begun(lighting.shaping_at(shaping, number), surface)
         return shaping, partial(_first, shaping)
-    return shaping, partial(_later, lighting, shaping, number, surface)
+    if instant.round.motion is None:
+        return shaping, partial(_later, lighting, shaping, number, surface)
+    depth = _later(lighting, shaping, number, surface)
+    give_back()
+    return shaping, lambda: depth
 
 
 def _first(shaping: Shaping) -> Depth:
