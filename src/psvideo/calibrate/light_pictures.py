@@ -20,6 +20,7 @@ from psvideo.clip.reading import looks
 from psvideo.clip.transfer import usual_transfer
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
+from psvideo.model.channels import mean_of_channels
 from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.plates.sequence import Round
 
@@ -72,7 +73,7 @@ class LightPictures:
     @property
     def grey(self) -> NDArray[np.float32]:
         """The mean over channels, shape (light, row, col)."""
-        return self.images if self.images.ndim == 3 else self.images.mean(axis=3, dtype=np.float32)
+        return self.images if self.images.ndim == 3 else mean_of_channels(self.images)
 
 
 def light_pictures(

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from psvideo.live.chain import NewestRound
 from psvideo.live.status import LiveStatus
+from psvideo.model.channels import brightest_channel
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
-from psvideo.model.rows.clipping import brightest_channel
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judgement import Judgement, gravest_first, verdict_of

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.ground import Ground, every_ray
 from psvideo.model.irradiance.near_light import near_field
 from psvideo.model.rig import Light
@@ -74,4 +75,4 @@ def _thin(plate: Samples | Mixture, step: int) -> NDArray[np.float32]:
     """Return every nth row and column of a plate, (row, col), its channels' mean."""
     some = plate.thinned(step) if isinstance(plate, Mixture) else plate[::step, ::step]
     some = np.asarray(some, np.float32)
-    return some if some.ndim == 2 else some.mean(axis=-1)
+    return some if some.ndim == 2 else mean_of_channels(some)

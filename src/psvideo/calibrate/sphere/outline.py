@@ -16,6 +16,7 @@ from psvideo.calibrate.sphere.rim_model import Surface
 from psvideo.calibrate.sphere.round_things import Grey, round_things
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.model.camera import FloatArray
+from psvideo.model.channels import mean_of_channels
 
 GIVEN_ERROR_PX = 0.5
 """Standard error in x, y and radius of an outline that a person marked."""
@@ -86,7 +87,7 @@ def rim_pictures(pictures: LightPictures, room: Grey | None = None) -> list[Grey
     groups = np.array_split(np.arange(len(grey)), min(len(grey), MOST_PICTURES))
     shown = [grey[group].mean(axis=0) for group in groups]
     if pictures.ambient is not None:
-        shown.append(pictures.ambient if pictures.ambient.ndim == 2 else pictures.ambient.mean(axis=2))
+        shown.append(pictures.ambient if pictures.ambient.ndim == 2 else mean_of_channels(pictures.ambient))
     if room is not None:
         shown.append(room)
     return [np.ascontiguousarray(picture, np.float32) for picture in shown]

@@ -4,7 +4,6 @@ Light is linear, 1.0 = sensor saturation. A camera's sample is clipped from SATU
 sample was clipped holds the plate's own saturation, to the bit; code that scales plates also allows for ROUNDING.
 """
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,6 @@ LOSSY_MARGIN = 0.018
 """Compressed files blur the very end: pictures that may come from such count as clipped this much sooner."""
 SMALL_PLATE_MARGIN = 0.048
 """A small plate's pixel is a mean that may hide brighter ones: what is measured there stays this much further away."""
-
-
-def brightest_channel(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return every pixel's brightest channel, (row, col), which decides whether the pixel is clipped."""
-    # channel by channel: numpy is slow along a short last axis
-    return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
 
 
 def at_saturation(image: NDArray[np.floating[Any]], saturation: float = 1.0) -> NDArray[np.bool_]:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.channels import brightest_channel
 from psvideo.model.coded import Image
-from psvideo.model.rows.clipping import brightest_channel
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.moving import Followed

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.channels import mean_of_channels
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
@@ -156,7 +157,7 @@ def separated(
 
 def _small(image: Image) -> Image:
     some = image[EVERY_ROW // 2 :: EVERY_ROW]
-    some = np.ascontiguousarray(some if some.ndim == 2 else some.mean(axis=2))
+    some = np.ascontiguousarray(some if some.ndim == 2 else mean_of_channels(some))
     size = (max(some.shape[1] // BLOCK_PX, 1), len(some))
     return np.asarray(cv2.resize(some, size, interpolation=cv2.INTER_AREA), np.float32)
 

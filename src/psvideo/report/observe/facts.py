@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
-from psvideo.model.rows.clipping import brightest_channel
+from psvideo.model.channels import brightest_channel
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import Round

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Masks
 from psvideo.compute.ranks import quantile
+from psvideo.model.channels import brightest_channel
 from psvideo.model.marker import NOT_FIRING
-from psvideo.model.rows.clipping import brightest_channel
 from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate

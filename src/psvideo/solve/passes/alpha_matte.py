@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
+from psvideo.model.channels import mean_of_channels
 from psvideo.solve.filling.filled import holes_in
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise
 from psvideo.solve.normals.solving import CERTAIN
@@ -39,7 +40,7 @@ def soft_matte(rows: PlateRows, noise: PlateNoise, *, mask: Mask | None = None) 
 
     def brightest(first: int, last: int) -> None:
         for light in range(len(rows.readers)):
-            np.maximum(most[first:last], rows.light(light, first, last).mean(axis=-1), out=most[first:last])
+            np.maximum(most[first:last], mean_of_channels(rows.light(light, first, last)), out=most[first:last])
 
     rows.over_bands(brightest)
     lit = cv2.medianBlur((most > lit_from(most, level)).view(np.uint8), 3) > 0
@@ -118,7 +119,7 @@ def _shared(rows: PlateRows, sides: _Sides, level: np.float32) -> Floats:
         plane = np.empty(rows.shape[:2], np.float32)
 
         def read(first: int, last: int, light: int = light, plane: Floats = plane) -> None:
-            plane[first:last] = rows.light(light, first, last).mean(axis=-1)
+            plane[first:last] = mean_of_channels(rows.light(light, first, last))
 
         rows.over_bands(read)
         flat = plane.reshape(-1)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.ground import every_ray
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Surface
@@ -77,10 +78,10 @@ def reach_of(one: Explaining) -> NDArray[np.uint8]:
     strength = one.lit.intensities.mean(axis=1).astype(np.float32)
 
     def count(first: int, last: int) -> None:
-        levels = [one.rows.light(light, first, last).mean(axis=-1) for light in range(lights)]
+        levels = [mean_of_channels(one.rows.light(light, first, last)) for light in range(lights)]
         usual = INDIRECT * np.mean([level / of for level, of in zip(levels, strength, strict=True)], axis=0)
         for light, (level, of) in enumerate(zip(levels, strength, strict=True)):
-            expected = one.expected(light, first, last).mean(axis=-1)
+            expected = mean_of_channels(one.expected(light, first, last))
             least = np.where(expected > dark, np.float32(SHADOWED) * expected, usual * of)
             reached = (level > dark) & (level > least) & one.rows.shown(light, first, last)
             reach[first:last] += reached & one.where(first, last)
