@@ -63,6 +63,20 @@ def test_frames_without_the_strobe_are_left_out_and_said(dark: slice, plan: Plan
     assert len(whole) > 0.8 * len(lit_s) * period_s / (plan.cycle_s / len(plan.cycle_slots))
 
 
+@pytest.mark.parametrize("late", [9, 12])
+def test_a_strobe_that_begins_a_little_late_is_timed_also_where_a_frame_is_lost(late: int, plan: Plan) -> None:
+    shot = shot_of(plan)
+    profiles = profiles_of(shot, slice(0, late))
+    profiles[57] = 0.0
+    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    off_s = np.abs(true_s[:, None] - timing.start_s).min(axis=0)
+    assert off_s.max() < 0.03 * plan.camera.row_time_s
+    assert timing.repeated_frames == ()
+    assert timing.dropped_frames == ()
+    assert any(f"No flash lights {late} frames in a row, 0 to {late - 1}" in note for note in timing.notes)
+
+
 def test_dark_slots_and_repeated_frames_are_not_left_out(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=48, width_px=12, readout=0.2)
     profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)

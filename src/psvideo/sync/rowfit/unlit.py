@@ -4,6 +4,8 @@ They look alike as repeated frames do, and fit no place in time. So they are lef
 and keep the places in time that their numbering gives them.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from psvideo.model.plan import Plan
@@ -11,8 +13,13 @@ from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, Mask, twins
 from psvideo.sync.rowfit.profiles import Profiles, slot_unknowns
 from psvideo.sync.rowfit.row_model import IntArray
 
-DARK, FLOOR = 0.02, 2.0
-"""A frame is dark whose rows are nearer than this share of their spreads to their darkest, a percentile of each."""
+DARK, FLOOR = 0.02, 0.02
+"""A frame is dark whose rows lie above their darkest, a quantile of each, by less than half this share of their spreads
+on an average: as much as noise on either side comes to. What lies below is no light, but a frame that was lost."""
+STRAY = 0.5
+"""Darker frames, up to this share of the shortest run that is looked for, make no floor."""
+REPEATED_LEAST = 2
+"""A frame in the dark may be shown so often where no lit one is."""
 VARIES = 0.03
 """Rows whose spread is below this share of the largest show nothing of the strobe."""
 ROWS = 60
@@ -25,9 +32,12 @@ def unlit(plan: Plan, rows: Profiles) -> Mask:
     """Return the frames that are dark for longer than the plan's own dark times make any, shape (frame,)."""
     few = rows.binned(ROWS)
     seen = few.spread > VARIES * few.spread.max()
-    floor = np.percentile(few.value, FLOOR, axis=0)
-    dark = np.abs((few.value - floor) / few.spread)[:, seen].mean(axis=1) < DARK
-    found = _in_long_runs(plan, rows, dark)
+    frames = len(few.value)
+    rank = max(FLOOR * frames, STRAY * _longest_run(plan, rows, REPEATED_LEAST))
+    floor = np.quantile(few.value, min(rank / frames, 1.0), axis=0)
+    dark = np.maximum((few.value - floor) / few.spread, 0.0)[:, seen].mean(axis=1) < DARK / 2
+    times = np.clip(1 + _longest(twins(few) & ~dark), REPEATED_LEAST, REPEATED_MOST)
+    found = _in_long_runs(dark, _longest_run(plan, rows, int(times)))
     return found if (~found).mean() > LEAST_SHARE else np.zeros_like(found)
 
 
@@ -36,17 +46,30 @@ def still(plan: Plan, rows: Profiles) -> Mask:
 
     They show a picture that is frozen, or a scene without flashes that is brighter than where it is darkest.
     """
-    return _in_long_runs(plan, rows, twins(rows.binned(ROWS)))
+    return _in_long_runs(twins(rows.binned(ROWS)), _longest_run(plan, rows, REPEATED_MOST))
 
 
-def _in_long_runs(plan: Plan, rows: Profiles, odd: Mask) -> Mask:
-    """Return those of the odd frames (frame,) that are more in a row than repeated frames of one dark time are."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], odd.astype(np.int64), [0]])))
-    longest = REPEATED_MOST * (int(_longest_dark_s(plan) / rows.period_s) + 1)
+def _in_long_runs(odd: Mask, longest: int) -> Mask:
+    """Return those of the odd frames (frame,) that are more in a row than ``longest``."""
     found = np.zeros(len(odd), np.bool_)
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in _runs(odd):
         found[first:last] = last - first > longest
     return found
+
+
+def _longest(odd: Mask) -> int:
+    return max((last - first for first, last in _runs(odd)), default=0)
+
+
+def _runs(odd: Mask) -> Iterator[tuple[int, int]]:
+    """Yield the first and the end of every run of odd frames (frame,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], odd.astype(np.int64), [0]])))
+    return zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _longest_run(plan: Plan, rows: Profiles, times: int) -> int:
+    """Return how many frames in a row one dark time makes where each is shown so many times."""
+    return times * (int(_longest_dark_s(plan) / rows.period_s) + 1)
 
 
 def with_unlit(rows: Profiles, index: IntArray, unlit: Mask) -> IntArray:
