@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_clip import live_clip
+from lit_ball import LIT_BALL
+from live_clip import SCENE, live_clip
 
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig
+from psvideo.live import chain
 from psvideo.live.chain import NewestRound
 from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.model.coded import Coded, Tone
@@ -54,6 +56,27 @@ def test_live_normals_are_those_of_the_offline_run(clip: Path, results: tuple[li
         apart = degrees_apart(newest.surface, same.surface)
         assert apart.size > 500
         assert np.percentile(apart, 99) < 0.2
+
+
+def test_what_the_subject_reflects_is_looked_at_again_after_some_rounds_and_held_between(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a glossy ball under noise every look gives other numbers."""
+    monkeypatch.setattr(chain, "LOOKED_AGAIN", 4)
+    lights = [(0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6), (0.2, 0.1), (-0.3, 0.3)]
+    listed = "".join(f"[[light]]\nname = 'l{n}'\ndirection = [{x}, {y}, 0.8]\n" for n, (x, y) in enumerate(lights))
+    gloss = "specular = { strength = 0.3, roughness = 0.35 }\n"
+    text = SCENE.replace(LIT_BALL, f'{listed}[[object]]\nmesh = "sphere"\nalbedo = 0.6\n{gloss}')
+    (tmp_path / "scene.toml").write_text(text.replace("width_m = 1.6", "width_m = 1.6\nfull_well_e = 9000"))
+    clip, shown = Path(ps.shoot(tmp_path / "scene.toml", tmp_path / "clip").path), list[NewestRound]()
+    live(clip, rig=clip / "rig.toml", pace="fastest", shown=shown.append)
+    surfaces = [one.surface for one in shown if one.surface is not None]
+    found = [one.misfit.reflectance for one in surfaces if one.misfit is not None]
+    assert len(found) == len(shown) > 8
+    looks = [found[first : first + 4] for first in range(0, len(found), 4)]
+    assert all(len(set(look)) == 1 for look in looks)
+    assert None not in found
+    assert len(set(found)) == len(looks)
 
 
 def test_the_written_timing_agrees_with_sync(clip: Path, results: tuple[list[NewestRound], Path]) -> None:

@@ -23,7 +23,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.rows.row_profiles import LOST, row_light
 from psvideo.model.rows.shutter import frames_touched
-from psvideo.model.surface import Surface
+from psvideo.model.surface import Subject, Surface
 from psvideo.model.timing import Timing, timed_camera
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import surfaces
@@ -32,6 +32,8 @@ from psvideo.solve.normals.solving import Solving
 
 GRID_PX = 240
 """What is trusted of a picture that is gone in a moment is told by half as many points a side as of one that stays."""
+LOOKED_AGAIN = 32
+"""What the subject reflects beyond n . l is found again after so many rounds: finding it takes 30 to 60 ms."""
 Search = Callable[[Callable[[], None]], None]
 """Runs a search: now, or beside what else goes on."""
 
@@ -103,6 +105,8 @@ class Chain:
     _first: int | None = None
     _last: int | None = None
     _wanted: int = 0
+    _subject: Subject | None = None
+    _solved: int = 0
     _guard: threading.RLock = field(default_factory=threading.RLock)
 
     @property
@@ -180,8 +184,15 @@ class Chain:
         rig = smaller_rig(self.rig, step)
         camera, lights = plan.camera, lights_as_planned(rig, plan)
         near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
-        solved = surfaces([one], plan, rig, solving=Solving(grid_px=GRID_PX), near=near, one_by_one=True)
-        return next((instant.surface for instant in solved), None)
+        known = self._subject if self._solved % LOOKED_AGAIN else None
+        solving = Solving(grid_px=GRID_PX, subject=known)
+        solved = surfaces([one], plan, rig, solving=solving, near=near, one_by_one=True)
+        surface = next((instant.surface for instant in solved), None)
+        if surface is not None:
+            self._solved += 1
+            if known is None:
+                self._subject = None if surface.misfit is None else Subject(reflectance=surface.misfit.reflectance)
+        return surface
 
     def _count(self, index: int) -> None:
         self.seen += 1
