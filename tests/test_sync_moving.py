@@ -52,6 +52,12 @@ def test_tails_that_the_plan_does_not_tell_are_found_or_claimed_before_a_subject
     assert timing.phase_error_rows < 0.1
 
 
+def test_rows_that_show_nothing_put_no_times_in_doubt() -> None:
+    timing, off_rows = timed(groups()["Scenes"]["void"], seed=0)
+    assert off_rows < timing.phase_error_rows < 0.01
+    assert not any("come early or late" in note for note in timing.notes)
+
+
 @pytest.mark.parametrize("share", [0.3, pytest.param(0.5, marks=pytest.mark.campaign)])
 def test_stripes_that_keep_pace_with_the_dark_row_are_timed(share: float) -> None:
     plan = plan_of(lights=tuple("abcde"), durations_s=(0.0016,), height_px=160, readout=0.9)

@@ -193,8 +193,9 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
 
 def _may_hide_tails(plan: Plan, rows: Profiles, fit: Fit) -> bool:
     """Return whether LEDs may rise and fall slowly without the picture or the plan telling it: the subject moves."""
+    plain = replace(rows, restless=None)
     told = max(plan.rise_s, plan.fall_s) > 0.0
-    return not told and (rows.restless is not None or gain_of(rows, fit.rest) < STILL)
+    return not told and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
 
 
 def _plausible(plan: Plan, beat: Beat) -> bool:

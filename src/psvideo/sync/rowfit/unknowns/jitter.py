@@ -151,7 +151,7 @@ def moved_flashes(flashes: Flashes, late_s: FloatArray) -> Flashes:
 
 
 def pulls(
-    rows: Profiles, fit: Fit, flashes: Flashes, among: slice = slice(None), *, robust: bool = True
+    rows: Profiles, fit: Fit, flashes: Flashes, among: slice | NDArray[np.bool_] = slice(None), *, robust: bool = True
 ) -> tuple[FloatArray, FloatArray]:
     """Return how strongly rows that open and rows that close shift each flash, shape (flash, 2) twice.
 

@@ -18,6 +18,8 @@ ALIKE = 2.0
 """Both kinds of rows show a stretch early or late where their mean is as many times half of their distance."""
 LEAST = 0.01
 """Share of the shortest flash by which a stretch must be off: less changes no plate by more."""
+DARK = 0.03
+"""Rows that change by less than this share of what the one that changes most does show no flash."""
 NORMAL = 1.4826
 """A standard deviation in median absolute deviations of normal errors."""
 
@@ -28,7 +30,8 @@ def unsteady_s(plan: Plan, rows: Profiles, fit: Fit, stray: Jitter) -> float:
     flashes = compiled_flashes(plan, rows, fit.beat)
     if len(stray.late_s):
         flashes = moved_flashes(flashes, stray.late_s)
-    pull, stiff = pulls(rows, fit, flashes, robust=False)
+    lit = rows.spread > DARK * rows.spread.max()
+    pull, stiff = pulls(rows.only_rows(lit), fit, flashes, lit, robust=False)
     both = stiff.min(axis=1)
     timed = both > ENOUGH * float(np.median(both[both > 0])) if (both > 0).any() else both > 0
     pull, stiff = pull[timed], stiff[timed]
