@@ -153,7 +153,8 @@ def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
         return np.asarray(both + how.torn * np.minimum(torn_deg, most_torn))
 
     sure, likely = of(signs.misfit_deg, signs.torn_deg), of(signs.likely_misfit_deg, signs.likely_torn_deg)
-    return np.sqrt(np.maximum(sure**2 + signs.lost_deg**2, likely**2 - signs.noise_deg**2))
+    least = np.maximum(likely, how.by_model * signs.by_model_deg)
+    return np.asarray(np.sqrt(np.maximum(sure**2 + signs.lost_deg**2, least**2 - signs.noise_deg**2)))
 
 
 @pytest.mark.parametrize(("lights", "robust", "moving"), [(4, False, False), (8, False, True), (6, True, False)])
@@ -169,8 +170,8 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
         assert name == "uneven" or seen[points.known].max() > 0.05, name
     for how in (Doubting(), Doubting(misfit_power=0.3, torn=1.0)):
         for unchecked in (0.0, np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)):
-            claimed = doubt_deg(replace(found, unchecked_deg=unchecked), how=how)
-            expected = doubt_in_numpy(replace(true, unchecked_deg=unchecked), how)
+            claimed = doubt_deg(replace(found, unchecked_deg=unchecked, by_model_deg=3 * unchecked), how=how)
+            expected = doubt_in_numpy(replace(true, unchecked_deg=unchecked, by_model_deg=3 * unchecked), how)
             assert claimed == pytest.approx(expected, rel=2e-3, abs=5e-3)
 
 

@@ -36,16 +36,26 @@ def points_of(
     solved = solved[found.valid[solved].any(axis=1)]
     rows = solved[np.unique(np.linspace(0, len(solved) - 1, ROWS).astype(np.intp))] if len(solved) else solved
     where, cols = np.nonzero(found.valid[rows])
-    few = max(min(POINTS, MEASUREMENTS // len(plates)), FEWEST)
     if len(where) < LEAST_POINTS:
         return None
+    few = max(min(POINTS, MEASUREMENTS // len(plates)), FEWEST)
     chosen = np.linspace(0, len(where) - 1, min(few, len(where))).astype(np.intp)
     at = (rows[where[chosen]], cols[chosen])
-    samples = np.stack([rows_of(plate, rows)[where[chosen], cols[chosen]] for plate in plates]).astype(np.float64)
-    here = np.ones(samples.shape[:2], bool) if seen is None else _seen(seen, at)
     normals = found.normals[at].astype(np.float64)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return _points((samples - black_level) * scale, lit, at, here, usable, normals)
+    return points_at(plates, lit, at, usable, normals, seen=seen, black_level=black_level, scale=scale)
+
+
+def points_at(
+    plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]],
+    usable: Usable, normals: Values, *, seen: Mask | None, black_level: float, scale: float,
+) -> SubjectPoints:  # fmt: skip
+    """Return what was measured at some rows and columns of the picture, where these are the normals (point, 3); few
+    rows are read once each."""
+    rows, where = np.unique(at[0], return_inverse=True)
+    samples = np.stack([rows_of(plate, rows)[where, at[1]] for plate in plates]).astype(np.float64)
+    here = np.ones(samples.shape[:2], bool) if seen is None else _seen(seen, at)
+    unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return _points((samples - black_level) * scale, lit, at, here, usable, unit)
 
 
 def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:

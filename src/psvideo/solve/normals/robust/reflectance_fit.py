@@ -11,6 +11,7 @@ towards the light is r = c max(l . v - c n . v, 0) / max(c, n . v), with v to th
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,8 @@ LEAST_FACING = 0.05
 """Of the cosines that roughness is divided by."""
 MODEL_WIDTH, WIDTH = 2.0, 0.6
 """Cauchy's width in standard deviations: of all residuals for the model, of a pixel's own for its normal."""
+OUTLYING = 3.0
+"""Shadows' edges and narrow highlights are few, and far off."""
 LEAST_SHARE = 0.01
 """A pixel's residuals are at least this share of its light."""
 
@@ -91,19 +94,18 @@ def joined(looks: Sequence[SubjectPoints]) -> SubjectPoints:
 def fitted(points: SubjectPoints) -> Reflectance | None:
     """Return the model that explains the points best, solved with their normals in turn; of FOR_SHINE lights or more
     any, of fewer that of rough surfaces alone."""
-    cosines = np.maximum((points.towards * points.normals).sum(axis=-1), 0.05)
-    sizes = _medians(points.measured / cosines, points.counts > 0)
+    sizes = sizes_of(points)
     known = sizes > 0
     points = points.only(known)
     g = points.normals * sizes[known, None]
     if len(g) < LEAST_POINTS:
         return None
     typical = median(sizes[known])
-    model, explained = _alternated(points, g, typical, rough=False)
+    model, explained, *_ = alternated(points, g, typical, rough=False)
     spread = np.linalg.svd(points.towards.mean(axis=1), compute_uv=False)
     rough, by_rough = np.zeros(NUMBERS), 0.0
     if spread[0] < WELL_SPREAD * spread[-1]:
-        rough, by_rough = _alternated(points, g, typical, rough=True)
+        rough, by_rough, *_ = alternated(points, g, typical, rough=True)
     if rough[ROUGH] >= LEAST_ROUGH and 1 - by_rough < LESS_LEFT * (1 - explained):
         model, explained = rough, by_rough
     elif len(points.measured) < FOR_SHINE:
@@ -113,16 +115,45 @@ def fitted(points: SubjectPoints) -> Reflectance | None:
     return Reflectance(*(float(each) for each in model[:SHINE]), *(float(each) * typical for each in model[SHINE:]))
 
 
-def _alternated(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> tuple[Values, float]:
-    """Return the model and what it explains, from normals that follow it; nothing where that is hopeless."""
+def sizes_of(points: SubjectPoints) -> Values:
+    """Return the albedo of every point with its normal, 0 where nothing was measured."""
+    cosines = np.maximum((points.towards * points.normals).sum(axis=-1), 0.05)
+    return _medians(points.measured / cosines, points.counts > 0)
+
+
+class ModelFollowed(NamedTuple):
+    """A model, what it explains, and the normals that follow it, times albedo."""
+
+    model: Values
+    explained: float
+    g: Values
+
+
+def alternated(
+    points: SubjectPoints, g: Values, typical: float, *, rough: bool, turns: int = ALTERNATIONS, least: float = -np.inf
+) -> ModelFollowed:
+    """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
+    than the ``least``."""
+    nothing = ModelFollowed(np.zeros(NUMBERS), 0.0, g)
     model, explained = np.zeros(NUMBERS), 0.0
-    for turn in range(ALTERNATIONS):
+    for turn in range(turns):
         model, explained = _model(points, g, typical, rough=rough)
-        if (turn and explained < HOPELESS) or (rough and not model[ROUGH]):
-            return np.zeros(NUMBERS), 0.0
+        if (turn and explained < HOPELESS) or (rough and not model[ROUGH]) or explained <= least:
+            return nothing
         for _ in range(SOLVED_AGAIN):
             g = _solved_again(points, g, model, typical)
-    return model, explained
+    return ModelFollowed(model, explained, g)
+
+
+def explained_evenly(points: SubjectPoints, g: Values, typical: float, model: Values) -> float:
+    """Return which share of the squares of what is left over a model explains, where no measurement counts less than
+    others but for OUTLYING times what is typical: what weights found in noise is gone."""
+    parts = _parts(points, g, typical)
+    left = parts - _explained(points.towards, points.counts, parts)
+    most = OUTLYING**2 * float((points.counts * left[0] ** 2).sum() / max(points.counts.sum(), 1))
+    rest = left[0] - np.tensordot(model, left[1:], axes=1)
+    before, after = (float((points.counts * np.minimum(each**2, most)).sum()) for each in (left[0], rest))
+    return 1 - after / max(before, 1e-30)
 
 
 def _medians(values: Values, counts: Mask) -> Values:
@@ -160,16 +191,21 @@ def _rough(points: SubjectPoints, normals: Values, c: Values) -> tuple[Values, V
     return shares * (towards - c * facing), by_c, by_z
 
 
+def _parts(points: SubjectPoints, g: Values, typical: float) -> Values:
+    """Return what was measured, in albedos, and what each number of the model would add, (part, light, point)."""
+    size, normals, c, h = _angles(points, g)
+    lit = c > 0
+    back, _, _ = _rough(points, normals, c)
+    bright = lit * np.minimum(typical / size, MOST_BRIGHT)
+    return np.concatenate([[points.measured / size, c * c * lit, back], bright * h**POWERS])
+
+
 def _model(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> tuple[Values, float]:
     """Return the numbers of the model, and the share of the squares of what is left over that it explains.
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
     """
-    size, normals, c, h = _angles(points, g)
-    lit = c > 0
-    back, _, _ = _rough(points, normals, c)
-    bright = lit * np.minimum(typical / size, MOST_BRIGHT)
-    parts = np.concatenate([[points.measured / size, c * c * lit, back], bright * h**POWERS])
+    parts = _parts(points, g, typical)
     weights, model, spread = points.counts, np.zeros(NUMBERS), 1.0
     left = parts
     for turn in range(REWEIGHTED):

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.task import Bytes, Floats, Samples
+from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.fewer_lights import widened
 
 TORN, NEAR = 5, 9
@@ -87,6 +88,7 @@ class Doubting:
     torn: float = 2.5
     torn_beside: float = 0.5
     torn_alone_deg: float = 0.1
+    by_model: float = 0.6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +100,8 @@ class Signs:
     surfaces do not: of that nothing is hidden. ``likely_misfit_deg``, ``likely_torn_deg``: the first and third without
     a margin for what noise could be instead; ``noise_deg`` is what noise makes of the normals. ``unchecked_deg``: what
     lights that cannot be held against each other leave of real surfaces, though nothing shows; it counts in errors, and
-    not in what is trusted."""
+    not in what is trusted. ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals
+    under four and five lights (``few_checked.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -110,6 +113,7 @@ class Signs:
     noise_deg: Floats
     uneven: Floats | float = 0.0
     unchecked_deg: Floats | float = 0.0
+    by_model_deg: Floats | float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
@@ -172,8 +176,11 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         line(one.indirect.counts), wider, plain, float(UNSURE_OF_NOISE), float(MOST_FIT_DEG), line(squares),
         line(noise), line(shown),
     )  # fmt: skip
+    still = points.known
     if turned_deg is not None:
-        squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
+        rests = cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
+        squares *= rests
+        still = still & rests
     surroundings = _Surroundings.both(points, noise, shown, one)
     misfit_deg, likely_deg = _roots(squares, surroundings)
     uneven = np.zeros_like(noise)
@@ -183,6 +190,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = _torn_deg(points, misfit_deg, uneven)
     used = (lights - one.indirect.counts).astype(np.intp)
+    by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
         likely_misfit_deg=likely_deg,
@@ -193,6 +201,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         noise_deg=points.noise_deg,
         lost_deg=points.noise_deg * np.sqrt(wider - 1)[used],
         hidden=hidden_by(lights) / hidden_by(ENOUGH_LIGHTS),
+        by_model_deg=0.0 if by_model is None else by_model,
     )
 
 
@@ -210,7 +219,10 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
         [
             *(signs.misfit_deg, signs.torn_deg, signs.likely_misfit_deg, signs.likely_torn_deg),
             *(signs.indirect_deg, signs.lost_deg, signs.noise_deg),
-            *(np.broadcast_to(np.float32(one), signs.misfit_deg.shape) for one in (signs.uneven, signs.unchecked_deg)),
+            *(
+                np.broadcast_to(np.float32(one), signs.misfit_deg.shape)
+                for one in (signs.uneven, signs.unchecked_deg, np.float32(how.by_model) * signs.by_model_deg)
+            ),
         ]
     )
     doubt = np.empty(planes.shape[1:], np.float32)

@@ -204,7 +204,8 @@ def fill_doubt(signs: Floats, factors: Floats, out: Floats) -> None:
     noise, whichever is more.
 
     signs: (sign, point) in degrees, a misfit and what is torn, both surely and likely; light from around; what noise
-    makes more where few lights reach; what noise makes; which share of the misfit is uneven; what cannot be checked.
+    makes more where few lights reach; what noise makes; which share of the misfit is uneven; what cannot be checked;
+    what the whole error is at least.
     factors: how much a misfit counts, for few lights as well; its power beyond 1; what is little of it; how much light
     from around counts, what is torn, and that at most, beside the rest and alone.
     """
@@ -224,7 +225,8 @@ def fill_doubt(signs: Floats, factors: Floats, out: Floats) -> None:
         sure += torn * min(signs[1, i], beside * sure + most)
         likely += torn * min(signs[3, i], beside * likely + most)
         lost, noise = signs[5, i], signs[6, i]
-        out[i] = np.sqrt(max(sure * sure + lost * lost, likely * likely - noise * noise))
+        least = max(likely, signs[9, i])
+        out[i] = np.sqrt(max(sure * sure + lost * lost, least * least - noise * noise))
 
 
 @FUSED.inlined

@@ -1,0 +1,105 @@
+"""What a subject's reflectance says of normals under four and five lights, which are too few to solve by it.
+
+There every model explains too much: a sheen passes for a turned normal, and a turned normal for a sheen. But by how
+much the model that fits all of the subject would turn them says how far they may be off.
+"""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.ranks import median
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.robust.reflectance import FEWEST, ROWS, points_at
+from psvideo.solve.normals.robust.reflectance_fit import (
+    FOR_SHINE,
+    LEAST_EXPLAINED,
+    LEAST_POINTS,
+    LEAST_ROUGH,
+    ROUGH,
+    SubjectPoints,
+    Values,
+    alternated,
+    explained_evenly,
+    sizes_of,
+)
+from psvideo.solve.normals.task import Floats, Mask
+
+FEWEST_LIGHTS = 4
+"""Three lights leave nothing that a model could explain."""
+SHADOWED = 0.2
+"""Below this share of the point's mean, light may come from neighbouring surfaces."""
+LEAST_EVENLY = 0.05
+"""Of what four lights leave of a matte subject a model explains up to 0.03 where all measurements count alike, though
+up to 0.9 of what its weights leave; of what shines a little 0.1, and much 0.5 to 0.9."""
+TURNS = 2
+"""How often model and normals follow each other: four times cost twice as much and say the same."""
+AROUND = 0.07
+"""Angles are means around a point, Gaussian of this standard deviation, as a share of the subject's size."""
+FAR = 1e-3
+"""Where points are farther than that, the mean of all of them counts, as this much of one."""
+
+
+def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) -> Floats | None:
+    """Return by how many degrees the subject's model would turn the normals around every point of every ``step``-th row
+    and column, of which ``thin`` is the surface, (row, col); None where the lights are too many or too few, or the
+    points, or normals follow such a model already. ``known``: (row, col), the points that speak for the subject."""
+    solved_by_it = thin.misfit is not None and thin.misfit.reflectance is not None
+    if solved_by_it or not FEWEST_LIGHTS <= len(one.plates) < FOR_SHINE:
+        return None
+    rows = np.flatnonzero(known.any(axis=1))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, ROWS).astype(np.intp))] if len(rows) else rows
+    where, cols = np.nonzero(known[rows])
+    if len(where) < LEAST_POINTS:
+        return None
+    chosen = np.linspace(0, len(where) - 1, min(FEWEST, len(where))).astype(np.intp)
+    here = rows[where[chosen]], cols[chosen]
+    at = here[0] * step, here[1] * step
+    usable = replace(one.usable, shadow_ratio=max(SHADOWED, one.usable.shadow_ratio))
+    normals = thin.normals[here].astype(np.float64)
+    points = points_at(
+        one.plates, one.lit, at, usable, normals, seen=one.seen, black_level=one.black_level, scale=one.scale
+    )
+    sizes = sizes_of(points)
+    some = sizes > 0
+    if np.count_nonzero(some) < LEAST_POINTS:
+        return None
+    angles = model_turns_deg(points.only(some), points.normals[some] * sizes[some, None])
+    return _around(known.shape, (here[0][some], here[1][some]), angles, int(known.sum()))
+
+
+def model_turns_deg(points: SubjectPoints, g: Values) -> Values:
+    """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3), either
+    one that shines or one that is rough, whichever is more. A model that explains LEAST_EVENLY counts nothing, one
+    that explains twice as much wholly: what comes and goes by its noise would flicker."""
+    sizes, most = np.linalg.norm(g, axis=1), np.zeros(len(g))
+    typical = median(sizes)
+    for rough in (False, True):
+        one = alternated(points, g, typical, rough=rough, turns=TURNS, least=LEAST_EXPLAINED)
+        holds = _beyond(explained_evenly(points, g, typical, one.model), LEAST_EVENLY)
+        holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if rough else 1.0
+        cosines = (one.g * g).sum(axis=1) / np.maximum(np.linalg.norm(one.g, axis=1) * sizes, 1e-12)
+        most = np.maximum(most, holds * np.degrees(np.arccos(np.clip(cosines, -1, 1))))
+    return most
+
+
+def _beyond(value: float, least: float) -> float:
+    """Return 0 up to the least value, and 1 from twice as much on."""
+    return min(max(value / least - 1, 0.0), 1.0)
+
+
+def _around(
+    shape: tuple[int, ...], at: tuple[NDArray[np.intp], NDArray[np.intp]], angles_deg: Values, points: int
+) -> Floats:
+    """Return the mean of angles at rows and columns around every point of a grid."""
+    planes = np.zeros((*shape, 2), np.float32)
+    planes[at] = np.stack([angles_deg, np.ones(len(angles_deg))], axis=-1)
+    width = int(AROUND * np.sqrt(6 * points)) // 2 * 2 + 1  # twice over squares this wide is nearly Gaussian
+    for _ in range(2):
+        planes = np.asarray(cv2.blur(planes, (width, width), borderType=cv2.BORDER_CONSTANT), np.float32)
+    planes *= np.float32(width**2)
+    common = np.float32(FAR * angles_deg.mean())
+    return np.asarray((planes[..., 0] + common) / (planes[..., 1] + np.float32(FAR)), np.float32)

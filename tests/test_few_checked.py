@@ -1,0 +1,156 @@
+"""Under four and five lights a model of the subject says how far normals may be off, and takes none of a matte one."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from ring_and_ball import ring
+
+from psvideo.model.surface import MEASURED, Misfit, Reflectance, Surface
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.trust import doubting, few_checked
+
+Array = NDArray[np.float64]
+SIZE = 72
+UP = np.array([0.0, 0.0, 1.0])
+TURNED, SLANT = np.radians([[184, 342, 52, 341], [29, 34, 52, 33]])
+FOUR = np.stack([np.sin(SLANT) * np.cos(TURNED), np.sin(SLANT) * np.sin(TURNED), np.cos(SLANT)], axis=-1)
+"""Lights whose residual hardly shows a sheen: what they leave of one is no more than noise."""
+
+
+def ball() -> tuple[Array, NDArray[np.bool_]]:
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    x, y = cols / (0.48 * SIZE), -rows / (0.48 * SIZE)
+    inside = x * x + y * y < 0.8
+    normals = np.stack([x, y, np.sqrt(np.where(inside, 1 - x * x - y * y, 1))], axis=-1)
+    return normals * inside[..., None], inside
+
+
+def shot(
+    normals: Array, ways: Array, shade: Callable[[Array, Array], Array], noise: float = 0.001
+) -> list[NDArray[np.float32]]:
+    """Plates of what ``shade`` makes of the cosines to the light and to half way, with a camera's noise."""
+    rng, half = np.random.default_rng(3), ways + UP
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    seen = [shade(np.maximum(normals @ a, 0), np.maximum(normals @ b, 0)) for a, b in zip(ways, half, strict=True)]
+    return [(each + rng.normal(0, noise, each.shape)).astype(np.float32) for each in seen]
+
+
+def matte(c: Array, _: Array) -> Array:
+    return 0.5 * c
+
+
+def glossy(c: Array, h: Array) -> Array:
+    return 0.3 * c + 0.3 * h**8 * (c > 0)
+
+
+def under(ways: Array) -> Illumination:
+    return Illumination(directions=ways, intensities=np.ones((len(ways), 1)))
+
+
+def off_deg(found: NDArray[np.floating], truth: Array) -> Array:
+    return np.asarray(np.degrees(np.arccos(np.clip((found.astype(np.float64) * truth).sum(axis=-1), -1, 1))))
+
+
+def solved(shade: Callable[[Array, Array], Array], noise: float = 0.001) -> tuple[Surface, Array]:
+    """Return what the four lights say of the ball, and by how much it is off where it was measured, else 0."""
+    normals, inside = ball()
+    found = Solving(error=True).solve(shot(normals, FOUR, shade, noise), under(FOUR), mask=inside)
+    assert found.source is not None
+    return found, np.where(found.source == MEASURED, off_deg(found.normals, normals), 0)
+
+
+def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doubting, "turned_by_model_deg", lambda *_: None)
+
+
+def test_a_sheen_under_four_lights_is_counted_in_what_normals_may_be_off_by(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, off = solved(glossy)
+    without_model(monkeypatch)
+    before, _ = solved(glossy)
+    assert found.error_deg is not None
+    assert before.error_deg is not None
+    here = np.asarray(found.source == MEASURED)
+    np.testing.assert_array_equal(found.normals[here], before.normals[here])
+    assert off[here].mean() > 5
+    within = [float((off <= 2 * error)[here].mean()) for error in (before.error_deg, found.error_deg)]
+    assert within[0] < 0.5
+    assert within[1] > 0.8
+    wrong = [float((each.valid & (off > 5)).sum() / here.sum()) for each in (before, found)]
+    assert wrong[0] > 0.5
+    assert wrong[1] < 0.15
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.01, 0.02])
+def test_noise_of_a_matte_subject_passes_for_no_model(noise: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = solved(matte, noise)
+    without_model(monkeypatch)
+    before, _ = solved(matte, noise)
+    assert found.error_deg is not None
+    assert before.error_deg is not None
+    assert found.valid.sum() > 0.5 * np.count_nonzero(found.source == MEASURED)
+    assert float((found.valid != before.valid).mean()) < 0.002
+    assert found.error_deg.mean() < 1.03 * before.error_deg.mean()
+
+
+def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
+    """Least squares over four lights of a ball that shines as the model does: a turn for every point."""
+    rng = np.random.default_rng(6)
+    truth = rng.normal(size=(400, 3)) * (1, 1, 0.5) + 1.4 * UP
+    truth /= np.linalg.norm(truth, axis=1, keepdims=True)
+    truth = truth[(truth @ FOUR.T > 0.15).all(axis=1)]
+    half = (FOUR + UP) / np.linalg.norm(FOUR + UP, axis=1, keepdims=True)
+    c, h = truth @ FOUR.T, truth @ half.T
+    measured = (0.5 * c + 0.25 * h**8).T
+    g = np.linalg.lstsq(FOUR, measured, rcond=None)[0].T
+    points = SubjectPoints(
+        measured=measured,
+        counts=np.ones_like(measured),
+        towards=np.repeat(FOUR[:, None], len(truth), axis=1),
+        half=np.repeat(half[:, None], len(truth), axis=1),
+        normals=g / np.linalg.norm(g, axis=1, keepdims=True),
+    )
+    turned = few_checked.model_turns_deg(points, g)
+    off = off_deg(g / np.linalg.norm(g, axis=1, keepdims=True), truth)
+    assert off.mean() > 3
+    assert 0.5 < turned.mean() / off.mean() < 2
+    flat = SubjectPoints(
+        measured=0.5 * c.T + rng.normal(0, 0.002, c.T.shape),
+        counts=points.counts,
+        towards=points.towards,
+        half=points.half,
+        normals=truth,
+    )
+    assert few_checked.model_turns_deg(flat, 0.5 * truth).max() < 1
+
+
+def test_angles_around_are_means_of_a_gaussian() -> None:
+    rng, shape = np.random.default_rng(8), (60, 80)
+    rows, cols = rng.integers(0, 60, 300), rng.integers(0, 80, 300)
+    angles = rng.gamma(2, 3, 300)
+    _, first = np.unique(rows * 80 + cols, return_index=True)
+    rows, cols, angles = rows[first], cols[first], angles[first]
+    around = few_checked._around(shape, (rows, cols), angles, 60 * 80)
+    row, col = np.mgrid[:60, :80]
+    square = (row[..., None] - rows) ** 2 + (col[..., None] - cols) ** 2
+    near = np.exp(-square / (2 * (few_checked.AROUND * np.sqrt(60 * 80)) ** 2))
+    true = (near @ angles) / near.sum(axis=-1)
+    inside = np.s_[10:-10, 10:-10]
+    assert np.abs(around[inside] - true[inside]).mean() < 0.15 * true.std()
+    lonely = few_checked._around((60, 80), (np.array([3]), np.array([4])), np.array([7.0]), 400)
+    np.testing.assert_allclose(lonely, 7, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("lights", "looked_at"), [(3, False), (5, True), (6, False)])
+def test_three_lights_leave_nothing_and_six_are_solved_by_the_model(lights: int, looked_at: bool) -> None:
+    normals, inside = ball()
+    ways = ring(lights, 35)
+    found, one, _ = Solving(error=True).measured(shot(normals, ways, glossy), under(ways), mask=inside)
+    assert (few_checked.turned_by_model_deg(found, 1, one, inside) is not None) == looked_at
+    model = Reflectance(curve=0.0, rough=0.5, broad=0.0, middle=0.0, narrow=0.0)
+    by_model = replace(found, misfit=Misfit(share=0.01, error_deg=1.0, reflectance=model))
+    assert few_checked.turned_by_model_deg(by_model, 1, one, inside) is None
