@@ -11,11 +11,12 @@ from psvideo.solve.normals.task import Floats
 
 ALL_EXPLAINED = 3
 """This many lights leave no residual."""
-OF_MATERIALS_DEG = np.float32(2.4)
+OF_MATERIALS_DEG = np.float32(2.5)
 """Two thirds of the normals are off by no more, for lights that spread noise into them once, beside what shows in
 normals that belong to no surface. Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig
 (Washington) and another renderer's bunny, 28 sets of three lights of each, well spread and nearly in a plane, all
-subjects alike; 2.05 to 2.7 with each of them left out in turn."""
+subjects alike (2.4, and 2.05 to 2.7 with each of them left out in turn). Since darker measurements count, 2.5 holds as
+many: 61 and 63 % within, 91 and 92 % within twice, of 20 sets each."""
 
 
 def unchecked_deg(normals: Floats, directions: np.ndarray) -> Floats:
