@@ -131,6 +131,8 @@ class Spread(NamedTuple):
 
     inverse: (3, 3), of the lights' normal equations. scale: degrees that hold a share of errors, per radian.
     variances: of a dark sample, per unit of albedo, of its square; the last instead of that for what residuals say.
+    toward: (3,), the lights' mean direction by their strengths: what a normal has along it is the mean light there, as
+        a share of what would shine straight on it.
     dim, wider: of near lights, at the points of a grid: irradiance over that in the middle, and by how much more noise
         spreads there for the lights' directions; empty for distant lights.
     """
@@ -138,6 +140,7 @@ class Spread(NamedTuple):
     inverse: Floats
     variances: Floats
     scale: np.float32
+    toward: Floats
     dim: Floats
     wider: Floats
 

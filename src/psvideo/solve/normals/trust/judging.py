@@ -168,7 +168,7 @@ class _Spread:
         channels = 1 if surface.albedo.ndim == 2 else surface.albedo.shape[-1]
         mean = float(strength.mean())
         floors = [(share * mean) ** 2 for share in (how.least_share, float(LIGHTS))]
-        variances = [noise.read / channels, noise.photon * mean / 2 / channels, *floors]
+        variances = [noise.read / channels, noise.photon * mean / channels, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
         plain = surface.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
         return cls(
@@ -177,6 +177,7 @@ class _Spread:
                 inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
                 variances=np.array(variances, np.float32),
                 scale=np.float32(np.degrees(how.held)),
+                toward=(matrix.mean(axis=0) / mean).astype(np.float32),
                 dim=near.dim,
                 wider=near.wider,
             ),

@@ -12,6 +12,7 @@ from psvideo.solve.normals.task import Bytes, Floats, Samples, Spread, Task, Wor
 TWO, MOST_FIT_DEG, LARGEST_DEG = np.float32(2), np.float32(60), np.float32(180)
 FACING = np.float32(0.05)  # the cosine up to which a light passes a surface by, where such light was not used
 SHADOWED = np.float32(0.25)  # of what a light would give, below which it is hindered
+LEAST_LEVEL = np.float32(0.25)  # of the light that shines straight on a surface, what is counted for noise at least
 MOST_INDIRECT = np.float32(0.5)  # of the albedo: more is a highlight, or a wrong normal
 
 
@@ -35,6 +36,7 @@ def judge_rows(
     share, scale = ONE / np.float32(channels), spread.scale * spread.scale
     v, inverse = spread.variances, spread.inverse  # numbers outside the loops, which then become vectors
     read, photon, own, of_fit = v[0], v[1], v[2], v[3]
+    tx, ty, tz = spread.toward[0], spread.toward[1], spread.toward[2]
     xx, yy, zz, xy, xz, yz = inverse[0, 0], inverse[1, 1], inverse[2, 2], inverse[0, 1], inverse[0, 2], inverse[1, 2]
     of_noise, counts, degrees_of, limit = factors[0] * factors[0], factors[1], factors[2], factors[3]
     trace, holds_fit = xx + yy + zz, f.size > 0
@@ -63,7 +65,8 @@ def judge_rows(
             size = max(sizes[col] * reaching[col], TINY)
             along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
             wide = max(trace - along, ZERO) * scale * turning[col]
-            noise = (read + photon * size) / (size * size)
+            level = size * max(x * tx + y * ty + z * tz, LEAST_LEVEL)
+            noise = (read + photon * level) / (size * size)
             more = beyond[col]
             if holds_fit:
                 one = decoded(f[row, col])
