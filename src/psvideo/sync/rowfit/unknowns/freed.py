@@ -186,7 +186,7 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
         tail_s = share * plan.shortest_flash_s
         beat = fit.beat.with_phase(fit.beat.clock.phase_s - tail_s)
         beat = replace(beat, rise_s=beat.rise_s + tail_s, fall_s=beat.fall_s + tail_s)
-        if robust_loss(rows, unexplained(plan, rows, beat, fit.weight), fit.rest) < limit:
+        if robust_loss(rows, unexplained(plan, rows, beat), fit.rest) < limit:
             return True
     return False
 
