@@ -72,6 +72,7 @@ class Doubting:
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
         there are more, where normals are as good as elsewhere. Under three lights, where nothing else speaks,
         they count by as much more as is unchecked.
+    by_model: the whole error is at least this share of the angle by which the subject's model would turn the normal.
 
     Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and virtual shapes of eight materials and under wrong rigs, under 5 to 96 lights, spread
