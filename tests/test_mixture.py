@@ -24,7 +24,8 @@ from psvideo.model.timing import Flash, Timing
 from psvideo.plates.align.packed import packed
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing import ready_mixture
-from psvideo.plates.mixing.mixture import Mixture, combined, made
+from psvideo.plates.mixing.mixture import Mixture, made
+from psvideo.plates.mixing.several_pictures import combined
 from psvideo.plates.split import split
 
 ROWS, COLS = 46, 38

@@ -18,7 +18,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.coded import IDENTITY, Coded, Image
 from psvideo.model.rows.clipping import SATURATED
 from psvideo.plates.ambient.ambient_level import AmbientLevel
-from psvideo.plates.mixing.mixing_kernel import COUNTS, mix_pictures, mix_rows
+from psvideo.plates.mixing.mixing_kernel import COUNTS, mix_rows
 from psvideo.plates.mixing.mixture_arrays import MixtureArrays
 from psvideo.plates.mixing.ready_mixture import ReadyMixture
 from psvideo.plates.mixing.thinning_kernel import mix_halved, mix_thinned
@@ -178,75 +178,6 @@ class Mixture:
             bound.run(mix_rows, np.sort(some), some, flat[first:last])
 
         _in_bands(band, len(rows), bound.mix.samples)
-
-
-def combined(pictures: Sequence[Mixture], shares: Sequence[float], *, ceiling: float) -> Mixture:
-    """Return the sum of pictures, each times its share; ``ceiling`` where any of them is clipped in a sample that
-    counts. A plate that lies in memory is clipped from 1.0 on."""
-    parts = _Parts.of(pictures)
-    taken = [part.any(axis=0) for part in parts.shares]
-    each = np.array(shares)
-    return Mixture(
-        frames=parts.frames,
-        coefficients=np.tensordot(each, parts.shares, 1),
-        levels=parts.levels,
-        taken=np.tensordot(each, parts.taken * np.array(taken)[:, None], 1),
-        ceiling=ceiling,
-        clips_from=min(1.0, *(one.clips_from for one in pictures)),
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Parts:
-    """What several pictures are made of, each once: their frames and levels, and what every one takes of them,
-    ``shares`` (picture, frame, row) and ``taken`` (picture, level, row)."""
-
-    frames: tuple[Coded, ...]
-    levels: tuple[AmbientLevel, ...]
-    shares: FloatArray
-    taken: FloatArray
-
-    @classmethod
-    def of(cls, pictures: Sequence[Mixture]) -> "_Parts":
-        frames = {id(frame): frame for one in pictures for frame in one.frames}
-        levels = {id(level): level for one in pictures for level in one.levels}
-        places = {key: place for parts in (frames, levels) for place, key in enumerate(parts)}
-        rows = pictures[0].shape[0]
-        shares, taken = (np.zeros((len(pictures), len(parts), rows)) for parts in (frames, levels))
-        for number, one in enumerate(pictures):
-            for frame, takes in zip(one.frames, one.coefficients, strict=True):
-                shares[number, places[id(frame)]] += takes
-            for level, takes in zip(one.levels, () if one.taken is None else one.taken, strict=True):
-                taken[number, places[id(level)]] += takes
-        return cls(frames=tuple(frames.values()), levels=tuple(levels.values()), shares=shares, taken=taken)
-
-
-def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, Image], None]:
-    """Return what makes rows of several pictures in the thread that calls it: ``make(rows, first, into)`` takes them in
-    rising order, and an array (picture, row, col[, channel]) that begins with the row ``first``."""
-    alike = {(one.ceiling, one.clips_from, one.shape, one.frames[0].codes.dtype, one.is_made) for one in pictures}
-    if len(alike) > 1 or pictures[0].is_made:
-        readers = [one.reader() for one in pictures]
-
-        def make_each(rows: NDArray[np.intp], first: int, into: Image) -> None:
-            whole = rows[-1] - rows[0] + 1 == len(rows)
-            spans = [(rows[0], rows[-1] + 1)] if whole else [(row, row + 1) for row in rows]
-            for read, made in zip(readers, into, strict=True):
-                for begin, end in spans:
-                    read(begin, end, made[begin - first : end - first])
-
-        return make_each
-    parts = _Parts.of(pictures)
-    together = replace(pictures[0], frames=parts.frames, coefficients=parts.shares[0], levels=parts.levels, taken=None)
-    counts: NDArray[np.bool_] = np.logical_or.reduce(parts.shares != 0)
-    bound = replace(together.bound(), counts=counts)
-    shares, taken = (np.ascontiguousarray(part, np.float32) for part in (parts.shares, parts.taken))
-
-    def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
-        flat = into.reshape(*into.shape[:2], -1)
-        bound.run(mix_pictures, rows, shares, taken, rows, first, flat)
-
-    return make
 
 
 def _copying(image: Image) -> Reader:

@@ -13,7 +13,8 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import combined, made
+from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.several_pictures import combined
 from psvideo.plates.split import Plate
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
 from psvideo.model.surface import Surface
-from psvideo.plates.mixing.mixture import Mixture, rows_maker
+from psvideo.plates.mixing.mixture import Mixture
+from psvideo.plates.mixing.several_pictures import rows_maker
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Result, Samples, Task
 
