@@ -14,7 +14,8 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
-from psvideo.formats.plan_toml import format_plan, parse_fps
+from psvideo.formats.frame_rates import parse_fps
+from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_folders import whole_folder
 from psvideo.model.camera import Camera, Encoding

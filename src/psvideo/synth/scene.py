@@ -12,7 +12,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from psvideo.formats.contract import Contract, read_toml
-from psvideo.formats.plan_toml import RoundTable, parse_fps
+from psvideo.formats.frame_rates import parse_fps
+from psvideo.formats.plan_toml import RoundTable
 
 SCHEMA = "psvideo-scene/1"
 

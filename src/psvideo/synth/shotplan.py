@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from psvideo.formats.plan_toml import parse_fps
+from psvideo.formats.frame_rates import parse_fps
 from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector, vector

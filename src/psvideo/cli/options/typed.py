@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from psvideo.cli.console import plain
 from psvideo.errors import UsageError
-from psvideo.formats.plan_toml import broadcast_fps
+from psvideo.formats.frame_rates import broadcast_fps
 from psvideo.model.choices import PREVIEWS, Preview
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}

@@ -12,7 +12,7 @@ from psvideo.errors import UsageError
 from psvideo.export.sequences.tags import Tags, sha256_of
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.formats.clocks_json import read_clocks
-from psvideo.formats.plan_toml import broadcast_fps
+from psvideo.formats.frame_rates import broadcast_fps
 from psvideo.formats.whole_folders import begun_folder, refuse_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
