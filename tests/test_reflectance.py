@@ -1,14 +1,22 @@
 """What a whole subject reflects beyond n . l is found from all of it, and used where a pixel is explained better."""
 
+from fractions import Fraction
+
 import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from ring_and_ball import ring
 
+from psvideo.model.camera import Camera
 from psvideo.model.irradiance.ground import Ground
-from psvideo.model.rig import Light
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Reflectance, Subject, Surface
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import made
+from psvideo.plates.sequence import Round
+from psvideo.solve.instants import subject_of
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
@@ -140,6 +148,44 @@ def test_what_is_matte_beside_clay_stays_matte(monkeypatch: pytest.MonkeyPatch) 
     before = off_deg(Solving().solve(plates, under(WAYS)).normals, normals)
     assert off[:, rough].mean() < 0.8 * before[:, rough].mean()
     assert off[:, ~rough].mean() <= 1.05 * before[:, ~rough].mean()
+
+
+def test_what_is_unsure_for_motion_says_nothing_of_the_subject() -> None:
+    """Residuals of what moved and was not followed look like roughness; what stands still beside it is matte."""
+    moved = np.arange(SIZE) < 0.75 * SIZE
+    plates = clay(waves(), WAYS, roughness=np.where(moved, 0.6, np.zeros((SIZE, SIZE))))
+    unsure = np.zeros((len(WAYS), SIZE // 2, SIZE // 2), np.float32)
+    unsure[3, :, moved[::2]] = 0.2
+    for off, found in ((None, True), (0.01 * unsure, True), (unsure, False)):
+        surface = Solving().solve(plates, under(WAYS), unsure=off)
+        assert surface.misfit is not None
+        assert (surface.misfit.reflectance is not None) == found
+        look = Solving().look(plates, under(WAYS), unsure=off)
+        assert look is not None
+        assert (reflectance_of([look]) is not None) == found
+    patchy = np.where(np.random.default_rng(3).random(unsure.shape[1:]) < 0.5, np.float32(0.2), np.float32(0))
+    unsure[5] = patchy  # what lies between is said to be sure by chance
+    assert Solving().look(plates, under(WAYS), unsure=unsure) is None
+
+
+def test_a_take_looks_at_what_is_sure_in_its_rounds() -> None:
+    moved, lamps = np.arange(SIZE) < 0.75 * SIZE, ring(6, 45)
+    pictures = clay(waves(), lamps, roughness=np.where(moved, 0.6, np.zeros((SIZE, SIZE))))
+    names = tuple(f"lamp{k}" for k in range(len(lamps)))
+    camera = Camera(width_px=SIZE, height_px=SIZE, fps=Fraction(60), exposure_s=1 / 60, readout_s=0.01)
+    flashes = tuple(PlannedFlash(lights={name: 1.0}, duration_s=5e-4) for name in names)
+    plan = Plan(camera=camera, flashes=flashes, dark_s=1e-3)
+    rig = Rig(lights=tuple(Light(name=name, direction=at) for name, at in zip(names, lamps, strict=True)))
+    plates = tuple(
+        LightPlate(light=name, number=1001, time_s=0.0, picture=made(picture), seen=np.ones(SIZE, np.bool_))
+        for name, picture in zip(names, pictures, strict=True)
+    )
+    unsure = np.zeros((len(names), SIZE, SIZE), np.float32)
+    unsure[2, :, moved] = 0.2
+    for off, found in ((None, True), (unsure, False)):
+        subject = subject_of([Round(number=1001, plates=plates, unsure=off)], plan, rig)
+        assert subject is not None
+        assert (subject.reflectance is not None) == found
 
 
 @pytest.mark.parametrize(("roughness", "lean_counts"), [(0.08, False), (0.3, True)])

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from bench.accuracy_measure import angles_deg
-from bench.accuracy_motion import ASLANT, BOX, UNALIGNED, Filmed, filmed, turn
+from bench.accuracy_motion import ASLANT, BOX, BUST, UNALIGNED, Filmed, filmed, turn
 
 from psvideo.model.surface import Surface
 from psvideo.plates.align.rounds import Aligning, aligned
@@ -49,6 +49,17 @@ def test_five_lights_whose_plates_one_normal_explains_are_trusted(
     assert aligned.error_deg is not None
     assert (trusted & (off_deg > FAR_OFF_DEG)).sum() < 0.03 * trusted.sum()
     assert (off_deg[trusted] <= 2 * np.maximum(aligned.error_deg[trusted].astype(np.float32), 1e-3)).mean() > 0.9
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("subject", "px"), [(BOX, 8), (BUST, 16)], ids=["a bare box by 8 px", "a bust by 16 px"])
+def test_what_tumbles_faster_than_can_be_followed_is_not_taken_for_clay(subject: dict[str, object], px: float) -> None:
+    clip = filmed(5, turn(px, ASLANT), noise=NOISE, subject=subject)
+    (plain, plain_deg), (aligned, off_deg) = judged(clip, UNALIGNED), judged(clip, Aligning())
+    shown = clip.truth(clip.shown(UNALIGNED)[1].time_s)[1] & plain.shown & aligned.shown
+    assert aligned.misfit is not None
+    assert aligned.misfit.reflectance is None
+    assert off_deg[shown].mean() < plain_deg[shown].mean() + 0.5
 
 
 PITCH_S, WAVE_PX, WAVE_PER_S, HEIGHT_PX = 0.01, 60.0, 9.0, 8.0

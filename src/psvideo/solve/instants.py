@@ -158,7 +158,8 @@ class _RoundSolver:
         """Return points of one round's subject, under near lights where its depth puts them."""
         given = self._given(one)
         lit = self._light(one)(ground=None) if self.near is None else self._surface(one, given)[1]
-        return self.solving.look(given.plates, lit, seen=given.shown, mask=given.mask)
+        unsure = _unsure(one, self.shares)
+        return self.solving.look(given.plates, lit, seen=given.shown, mask=given.mask, unsure=unsure)
 
     def _given(self, one: Round) -> _Given:
         whole = all(plate.seen.ndim == 1 for plate in one.plates)

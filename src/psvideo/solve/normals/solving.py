@@ -89,16 +89,23 @@ class Solving:
         return with_unchecked(whole, one, noise)
 
     def look(
-        self, plates: Plates, lit: Illumination, *, seen: Mask | None = None, mask: Mask | None = None
+        self,
+        plates: Plates,
+        lit: Illumination,
+        *,
+        seen: Mask | None = None,
+        mask: Mask | None = None,
+        unsure: Floats | None = None,
     ) -> SubjectPoints | None:
-        """Return points from which the subject's reflectance is found, None where it is not looked at or shows none."""
+        """Return points from which the subject's reflectance is found, None where it is not looked at or shows none;
+        those whose plates are ``unsure`` for motion say nothing of it."""
         if not self.looks_at_subject(len(plates)):
             return None
         noise = noise_of(plates, lit)
         usable = _usable(noise, lit.intensities.shape[1], "robust")
         return huber1981.look(
             plates, lit, seen=seen, mask=mask, usable=usable, reweighting=EVERYTHING, plate_noise=noise,
-            spare=self.spare,
+            spare=self.spare, unsure=unsure,
         )  # fmt: skip
 
     def measured(
@@ -126,44 +133,36 @@ class Solving:
             grid_px=self.grid_px,
         )
         looks = IndirectLook.of(one)
-        solved = self._solved(plates, lit, usable, noise, seen, mask, looks)
+        solved = self._solved(one, noise, looks)
         return solved, replace(one, indirect=looks.found, left=looks.left if looks.left.lights.size else None), noise
 
-    def _solved(
-        self,
-        plates: Plates,
-        lit: Illumination,
-        usable: Usable,
-        noise: PlateNoise,
-        seen: Mask | None,
-        mask: Mask | None,
-        looks: Looks,
-    ) -> Surface:
+    def _solved(self, one: Evidence, noise: PlateNoise, looks: Looks) -> Surface:
         """Return what the solver makes of the plates."""
-        if self.method(len(plates)) == "robust":
+        if self.method(len(one.plates)) == "robust":
             return huber1981.solve(
-                plates,
-                lit,
-                seen=seen,
-                mask=mask,
+                one.plates,
+                one.lit,
+                seen=one.seen,
+                mask=one.mask,
                 half=self.half,
                 residual=self.residual,
-                usable=usable,
+                usable=one.usable,
                 reweighting=EVERYTHING,
                 subject=self.subject,
                 plate_noise=noise,
                 spare=self.spare,
+                unsure=one.unsure,
                 looks=looks,
             )
-        residual = self.residual or len(plates) > 3  # three measurements leave none
+        residual = self.residual or len(one.plates) > 3  # three measurements leave none
         return woodham1980.solve(
-            plates,
-            lit,
-            seen=seen,
-            mask=mask,
+            one.plates,
+            one.lit,
+            seen=one.seen,
+            mask=one.mask,
             half=self.half,
             residual=residual,
-            usable=usable,
+            usable=one.usable,
             spare=self.spare,
             looks=looks,
         )

@@ -62,6 +62,7 @@ def solve(
     subject: Subject | None = None,
     plate_noise: PlateNoise | None = None,
     spare: Path | None = None,
+    unsure: Floats | None = None,
     looks: Looks | None = None,
     threads: int | None = None,
 ) -> Surface:
@@ -69,7 +70,8 @@ def solve(
 
     Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error as well. ``misfit`` is
     what is typical of the picture; left out, it is found first, from a sample of the picture's rows. ``subject`` is
-    what rounds of a take share; left out, it is found from these plates alone. Where ``plate_noise`` is known, what
+    what rounds of a take share; left out, it is found from these plates alone, where they are not ``unsure`` for motion
+    (light, row, col of a grid of its own). Where ``plate_noise`` is known, what
     plain least squares explains to the noise is left to it: nothing is better there.
 
     Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
@@ -90,7 +92,9 @@ def solve(
     if misfit is None:
         found, misfit, step = _first_look(solution, reweighting, noise)
         if misfit is not None and subject is None:
-            points = points_of(plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale)
+            points = points_of(
+                plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale, unsure=unsure
+            )
             subject = Subject(reflectance=None if points is None else reflectance_of([points]))
         if misfit is not None and subject is not None:
             misfit = replace(misfit, reflectance=subject.reflectance)
@@ -117,6 +121,7 @@ def look(
     reweighting: Reweighting = Reweighting(),
     plate_noise: PlateNoise | None = None,
     spare: Path | None = None,
+    unsure: Floats | None = None,
 ) -> SubjectPoints | None:
     """Return points of the subject, as ``solve`` finds its reflectance from; None where they or the lights are too few.
 
@@ -127,7 +132,7 @@ def look(
     found, misfit, step = _first_look(solution, reweighting, noise)
     if misfit is None:
         return None
-    return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0)
+    return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0, unsure=unsure)
 
 
 @dataclass(frozen=True, kw_only=True)

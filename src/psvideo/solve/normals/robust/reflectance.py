@@ -2,20 +2,28 @@
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import rows_of
 from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, Values, fitted, joined
-from psvideo.solve.normals.task import Mask, Samples, Usable
+from psvideo.solve.normals.task import Floats, Mask, Samples, Usable
 
 LEAST_LIGHTS = 5
 ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800
 """The model is fitted to this many points of this many rows, to fewer under many lights."""
+MOST_UNSURE = 0.05
+"""What a light's plate may be off by for motion, as a share of what shines straight on the surface, where a point still
+speaks for the subject: what was not followed leaves residuals that pass for sheen and roughness."""
+AROUND_SHARE = 1 / 16
+"""... nor on average over such a share of the picture's longer side: where most of what is around was not followed,
+what fits does so by chance."""
 
 
 def reflectance_of(looks: Sequence[SubjectPoints]) -> Reflectance | None:
@@ -26,16 +34,17 @@ def reflectance_of(looks: Sequence[SubjectPoints]) -> Reflectance | None:
 
 def points_of(
     plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, found: Surface, usable: Usable,
-    *, step: int, seen: Mask | None, black_level: float, scale: float,
+    *, step: int, seen: Mask | None, black_level: float, scale: float, unsure: Floats | None = None,
 ) -> SubjectPoints | None:  # fmt: skip
     """Return points of a subject solved in every ``step``-th row; None where they or the lights are too few. Arguments
-    are those of ``huber1981.solve``."""
+    are those of ``huber1981.solve``; what is ``unsure`` of the plates is passed over."""
     if len(plates) < LEAST_LIGHTS:
         return None
     solved = np.arange(0, found.valid.shape[0], step)
     solved = solved[found.valid[solved].any(axis=1)]
     rows = solved[np.unique(np.linspace(0, len(solved) - 1, ROWS).astype(np.intp))] if len(solved) else solved
-    where, cols = np.nonzero(found.valid[rows])
+    known = found.valid[rows] if unsure is None else found.valid[rows] & _sure(unsure, found, rows, lit)
+    where, cols = np.nonzero(known)
     if len(where) < LEAST_POINTS:
         return None
     few = max(min(POINTS, MEASUREMENTS // len(plates)), FEWEST)
@@ -56,6 +65,21 @@ def points_at(
     here = np.ones(samples.shape[:2], bool) if seen is None else _seen(seen, at)
     unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return _points((samples - black_level) * scale, lit, at, here, usable, unit)
+
+
+def _sure(unsure: Floats, found: Surface, rows: NDArray[np.intp], lit: Illumination) -> Mask:
+    """Return of some rows where no light's plate may be off by more than MOST_UNSURE, there and around."""
+    high, wide = unsure.shape[1:]
+    window = (max(round(max(high, wide) * AROUND_SHARE) | 1, 3),) * 2
+    most = np.zeros((high, wide), np.float32)
+    for plane, lamp in zip(unsure, lit.intensities.mean(axis=1), strict=True):
+        share = np.minimum(plane / np.float32(lamp), np.float32(1))
+        np.maximum(most, np.maximum(share, cv2.blur(share, window)), out=most)
+    albedo = found.albedo[rows].astype(np.float32)
+    albedo = albedo if albedo.ndim == 2 else mean_of_channels(albedo)
+    cols = np.arange(albedo.shape[1])
+    here = most[(rows * high // len(found.valid))[:, None], cols * wide // len(cols)]
+    return np.asarray(here <= np.float32(MOST_UNSURE) * albedo)
 
 
 def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:
