@@ -14,9 +14,12 @@ from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_dura
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
 from psvideo.plates import sequence
+from psvideo.plates.align.velocity.flow import changed, comparable, sketch_of, white_of
 from psvideo.plates.ambient import ambient_off
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import Round, coming, light_plates
 from psvideo.plates.split import split
+from psvideo.report.observe.motion import glimpse, motion_between
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.noise import NOISELESS
 
@@ -184,3 +187,55 @@ def test_the_clip_s_ends_give_the_lights_that_are_complete_there_and_no_others(m
             if flash.complete and flash.lights
         ]
         assert sorted(found, key=lambda pair: pair[1]) == want
+
+
+PATTERNS = [
+    ({"a": 1.0, "b": 1.0}, 0.0012),
+    ({"b": 1.0, "c": 1.0}, 0.0012),
+    ({"a": 1.0, "c": 1.0}, 0.0012),
+    ({}, 0.0012),
+]
+
+
+def of_light_a(plan: Plan, lights: dict[str, np.ndarray]) -> list[LightPlate]:
+    shot, timing = shoot(plan, lights, frames=40, noise=Noise(full_well_e=20_000, read_e=5))
+    return [one.plates[0] for one in gathered(plan, shot, timing) if one.lights == ("a", "b", "c")]
+
+
+def uneven(plan: Plan, brightest: float) -> np.ndarray:
+    """A picture from black to its brightest, across and along."""
+    rows, cols = np.mgrid[0 : plan.camera.height_px, 0 : plan.camera.width_px]
+    return (brightest * (0.15 + 0.85 * (0.5 + 0.5 * np.sin(rows / 9) * np.cos(cols / 11)))).astype(np.float32)
+
+
+def test_flashes_of_several_lights_that_clip_do_not_look_like_motion(make_plan: PlanMaker) -> None:
+    """Two frames that share a flash do not clip where one that holds all of it does: rounds differ by the ceiling."""
+    plan = patterned(make_plan(duration_s=0.0012, height_px=120, width_px=160), PATTERNS)
+    light = uneven(plan, 0.75)  # two at once are half as bright again as what clips
+    one, other = of_light_a(plan, {"a": light, "b": light[::-1], "c": light[:, ::-1]})[1:3]
+    assert (np.abs(one.image - other.image) > 0.3).mean() > 0.01, "rounds do differ"
+    white = white_of(one)
+    before, after = sketch_of(one, white=white), sketch_of(other, white=white)
+    assert not changed(before, after).any()
+    codes = [picture.astype(int) for picture in comparable(before, after)]
+    assert np.abs(codes[0] - codes[1]).max() < 20, "noise"
+    seen = glimpse(one)
+    found = motion_between(seen, glimpse(other, seen.white))
+    assert found is not None
+    assert found.share == 0
+
+
+def test_a_thing_that_clips_flashes_of_several_lights_moves_where_it_comes_and_goes(make_plan: PlanMaker) -> None:
+    plan = patterned(make_plan(duration_s=0.0012, height_px=120, width_px=160), PATTERNS)
+    light = uneven(plan, 0.15)
+    light[:30, :30] = 0.3  # bright enough that it might clip in another round
+    bright = light.copy()
+    bright[40:72, 64:104] = 0.7
+    one, other = (of_light_a(plan, dict.fromkeys("abc", shown))[1] for shown in (light, bright))
+    white = white_of(one)
+    found = changed(sketch_of(one, white=white), sketch_of(other, white=white))
+    assert found[11:17, 17:25].all(), "all of the thing within"
+    seen = glimpse(one)
+    moving = motion_between(seen, glimpse(other, seen.white))
+    assert moving is not None
+    assert moving.share > 0.05

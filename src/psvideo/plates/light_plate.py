@@ -16,7 +16,8 @@ class LightPlate:
 
     ``seen`` (row,) is as in a Plate, or (row, col) where motion hid parts of the plate.
 
-    ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
+    ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full. It
+    is so bright at least, or ``unmixed``: a difference of flashes, of which one was clipped, and may be anything.
     ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
     show ``time_s``.
     """
@@ -27,6 +28,7 @@ class LightPlate:
     picture: Mixture
     seen: NDArray[np.bool_]
     saturation: float = 1.0
+    unmixed: bool = False
     shown_s: FloatArray | None = None
 
     @property

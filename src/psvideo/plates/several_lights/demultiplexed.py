@@ -96,7 +96,13 @@ def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> L
     picture = combined([part.picture for part in parts], [float(share) for share in shares], ceiling=saturation)
     time_s = _time_s(parts, shares)
     return LightPlate(
-        light=light, number=number, time_s=time_s, picture=picture.within(seen), seen=seen, saturation=saturation
+        light=light,
+        number=number,
+        time_s=time_s,
+        picture=picture.within(seen),
+        seen=seen,
+        saturation=saturation,
+        unmixed=True,
     )
 
 

@@ -3,7 +3,7 @@
 Only what changed by more than noise is asked for its flow, so that noise does not pass for motion.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
 from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.several_lights.filled import Filled, coarser, filled_of, vague_between
 
 WIDTH_PX = 480
 TOE = 0.02
@@ -32,13 +33,15 @@ FOLLOWED = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class Glimpse:
-    """A plate as motion is judged by: ``codes`` (row, col), how many picture pixels one of theirs is, and when."""
+    """A plate as motion is judged by: ``codes`` (row, col), how many picture pixels one of theirs is, and when, and
+    where it says nothing, ``filled``."""
 
     codes: NDArray[np.uint8]
     scale: float
     time_s: float
     white: float
     seen: bool
+    filled: Filled | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +62,8 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     step = max(round(cols / (2 * WIDTH_PX)), 1)
     step *= 2 if -(-cols // step) > WIDTH_PX else 1
     step = min(step, rows)
-    some = plate.picture.rows(range(0, rows - step + 1, step))  # few rows are made, and means taken along them
+    chosen = range(0, rows - step + 1, step)  # few rows are made, and means taken along them
+    some = plate.picture.rows(chosen)
     grey = np.ascontiguousarray(some if some.ndim == 2 else some[..., 1])
     if step > 1:
         grey = np.asarray(cv2.resize(grey, (cols // step, len(grey)), interpolation=cv2.INTER_AREA), np.float32)
@@ -68,13 +72,17 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
     whole = bool(plate.rows_seen.all())
-    return Glimpse(codes=codes, scale=plate.shape[1] / grey.shape[1], time_s=plate.time_s, white=white, seen=whole)
+    scale_px = plate.shape[1] / grey.shape[1]
+    filled = coarser(filled_of(plate, chosen), 1, step)
+    return Glimpse(codes=codes, scale=scale_px, time_s=plate.time_s, white=white, seen=whole, filled=filled)
 
 
 def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     """Return what moved between two plates of one light; None where rows are missing."""
     if not (before.seen and after.seen):
         return None
+    if (vague := vague_between(before.filled, after.filled)) is not None:
+        after = replace(after, codes=np.where(vague, before.codes, after.codes))
     one, other = (picture.codes.astype(np.float32) for picture in (before, after))
     changed = _changed(one, other)
     still = Motion(speed_px_s=0.0, share=0.0)

@@ -16,6 +16,7 @@ from psvideo.compute.ranks import quantile
 from psvideo.model.coded import Image
 from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.several_lights.filled import Filled, coarser, filled_of, vague_between
 
 Codes = NDArray[np.uint8]
 Vectors = NDArray[np.float32]
@@ -51,7 +52,8 @@ QUARTER_OF_NORMAL = 0.3186
 @dataclass(frozen=True, kw_only=True)
 class Sketch:
     """A plate as flow sees it: ``codes`` (row, col), which of these rows any frame saw, ``seen`` (row,), and the means
-    of blocks of codes, ``blocks`` (row, col). ``white`` is the light of code 255."""
+    of blocks of codes, ``blocks`` (row, col). ``white`` is the light of code 255, and ``filled`` where codes say
+    nothing."""
 
     number: int
     time_s: float
@@ -59,6 +61,7 @@ class Sketch:
     seen: Flags
     blocks: Vectors
     white: float
+    filled: Filled | None = None
 
 
 def white_of(plate: LightPlate) -> float:
@@ -81,7 +84,10 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     root_rows(light, np.float32(1 / white), np.float32(TOE), np.float32(root), scale, shown, codes)
     size = max(shown.shape[1] // BLOCK_PX, 1), max(shown.shape[0] // BLOCK_PX, 1)
     blocks = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
-    return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks, white=white)
+    filled = coarser(filled_of(plate, range(rows)), *((2, 2) if halved else (1, 1)))
+    return Sketch(
+        number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks, white=white, filled=filled
+    )
 
 
 def _grey(image: Image) -> Image:
@@ -91,12 +97,15 @@ def _grey(image: Image) -> Image:
 
 
 def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
-    """Return the codes of both; a row that one of them lacks shows the same in both, and so does not seem to move."""
+    """Return the codes of both; a row that one of them lacks shows the same in both, and so does not seem to move, nor
+    does what is filled."""
     one, other = before.codes, after.codes
     if not before.seen.all():
         one = np.where(before.seen[:, None], one, other)
     if not after.seen.all():
         other = np.where(after.seen[:, None], other, one)
+    if (vague := vague_between(before.filled, after.filled)) is not None:
+        other = np.where(vague, one, other)
     return one, other
 
 
@@ -108,6 +117,9 @@ def changed(before: Sketch, after: Sketch) -> Flags:
     if not rows_seen.all():
         shown = cv2.resize(rows_seen[:, None].astype(np.float32), (1, len(change)), interpolation=cv2.INTER_AREA)
         change[shown[:, 0] < 1] = 0
+    if (vague := vague_between(before.filled, after.filled)) is not None:
+        hidden = cv2.resize(vague.astype(np.float32), change.shape[::-1], interpolation=cv2.INTER_AREA)
+        change[hidden > 0] = 0
     local = cv2.blur(change * change, (AROUND, AROUND))
     blocks = BLOCK_NOISE_FACTOR * min(_spread(change, before.blocks, CODED_BLOCKS), MOST_BLOCK_NOISE)
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise_between(before, after) / BLOCK_PX, blocks) ** 2)
