@@ -99,6 +99,17 @@ def test_pictures_find_their_lights_by_name_whatever_the_order_and_the_holes(tmp
     assert not report.timing.dropped_frames
 
 
+def test_a_result_of_photographs_is_delivered_at_a_rate_that_programs_know(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    ps.stills(
+        photographs(tmp_path / "photos", lit(), NAMES[:6]), lights=listed(tmp_path / "l.lp"), out=out, plates=True
+    )
+    rates = {float(OpenEXR.File(str(path)).header()["framesPerSecond"]) for path in out.rglob("*.exr")}
+    assert rates == {24.0}
+    (timeline,) = out.glob("*.otio")
+    assert '"rate": 24' in timeline.read_text()
+
+
 def test_large_plain_tiffs_give_the_same_bytes_and_one_that_is_cut_short_while_it_is_solved_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

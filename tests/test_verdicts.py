@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from psvideo.model.camera import Camera
+from psvideo.clip.transfer import stops_unused
+from psvideo.model.camera import Camera, Encoding
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Misfit, Surface
@@ -19,6 +20,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.judge import of_motion, of_rows, of_timing, result
+from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
@@ -392,6 +394,29 @@ SOLVED = [
     _by("flicker", steadiness, "flicker", {"gains": [[1.0] * 3, [1.008] * 3]}, {"gains": [[1.0] * 3, [1.013] * 3]},
         rounds=2, lights=3),
 ]  # fmt: skip
+
+
+PQ = Encoding(transfer="st2084")
+
+
+@pytest.mark.parametrize(("stops", "encoding", "grade"), [
+    (-3.7, PQ, "good"),  # 1,000 cd/m2, all that cameras record as PQ, is 3.3 stops below its largest code
+    (-7.0, PQ, "doubtful"),
+    (-9.5, PQ, "bad"),
+    (-3.7, replace(PQ, white_level=769.0), "doubtful"),  # the plan says where the sensor saturates
+    (-3.7, Encoding(transfer="logc4"), "good"),  # ends 11.3 stops above middle grey
+    (-3.7, Encoding(transfer="hlg"), "doubtful"),
+])  # fmt: skip
+def test_a_curve_that_reaches_beyond_all_sensors_makes_no_picture_dark(
+    stops: float, encoding: Encoding, grade: str
+) -> None:
+    one = Footage(stops=stops, noise=1e-5).observed(0)
+    plan = plan_of(one.lights)
+    plan = replace(plan, camera=replace(plan.camera, encoding=encoding))
+    lines = judgements(plan, timing_of(), one)
+    assert graded(lines, "exposure") == grade
+    said = next(line.found for line in lines if line.subject == "exposure")
+    assert ("saturation" in said) == (stops_unused(encoding) == 0)
 
 
 def test_a_subject_that_clips_everywhere_is_called_so_and_is_told_to_look_again() -> None:

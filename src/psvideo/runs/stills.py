@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
@@ -27,6 +28,9 @@ from psvideo.runs.photographs.still_rig import KnownLights, listed_lights, spher
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.lighting import read_lighting
 from psvideo.runs.steps.output import Output
+
+STILL_HZ = Fraction(24)
+"""What programs take a single picture for; one that stood for the pictures' number would be a rate of nothing."""
 
 
 def stills(
@@ -144,6 +148,7 @@ def stills(
                 solver=solver,
                 fill=fill,
                 over_time=over_time,
+                shown_at_hz=STILL_HZ,
             )
             return normals_run(job, output, watch=watch, beside=partial(write_setup, opened, rti=rti)).report
 

@@ -1,4 +1,4 @@
 """Flashes in which more than one light is on: ``demultiplexed`` solves patterns, ``unmixed`` LEDs of different colours.
 
-For the latter, ``surface_colour`` finds what colour the surface itself has.
+For the latter, ``surface_colour`` finds what colour the surface itself has, ``filled`` where clipped flashes say nothing.
 """

@@ -1,5 +1,6 @@
 """All judgements of a take, line by line: what check says on the set, and the report after a run."""
 
+from psvideo.clip.transfer import stops_unused
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import ambient
@@ -32,7 +33,7 @@ def judgements(
     return (
         *on_time,
         *coverage(plan, timing, observed, take_s=take_s),
-        *exposure(observed),
+        *exposure(observed, unused_stops=stops_unused(plan.camera.encoding)),
         *lamps(observed, timed=all(one.grade == "good" for one in on_time), missed=in_step(plan, timing)),
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),

@@ -26,8 +26,9 @@ MORE_LIGHT = (
 )
 
 
-def exposure(observed: Observed) -> Iterator[Judgement]:
-    """Judge how bright the brightest lamp's plates are, and how much each lamp clips."""
+def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judgement]:
+    """Judge how bright the brightest lamp's plates are, and how much each lamp clips; ``unused_stops``: by how many the
+    largest code lies above all that a camera records."""
     levels = {light: observed.levels(light) for light in observed.lights if light in observed.counts}
     if not any(one.total for one in levels.values()):
         yield Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
@@ -43,21 +44,22 @@ def exposure(observed: Observed) -> Iterator[Judgement]:
     clipped = list(_clipping(levels))
     top = max(one.stops(TARGET_QUANTILE) for one in levels.values())
     worst = max(one.clipped_share for one in levels.values())
-    if top < DIM_STOPS:
+    under = "saturation" if not unused_stops else "the largest code, which this curve puts above what sensors show"
+    if top < DIM_STOPS - unused_stops:
         yield Judgement(
             subject="exposure",
-            grade="bad" if top < DARK_STOPS else "doubtful",
+            grade="bad" if top < DARK_STOPS - unused_stops else "doubtful",
             found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
-            "saturation, so noise is large.",
-            advice=f"Open the aperture by about {_half(BEST_STOPS - top)}, or flash longer or stronger. Where files "
+            f"{under}, so noise is large.",
+            advice=f"Open the aperture by about {_half(BEST_STOPS - unused_stops - top)}, or flash longer or stronger. Where files "
             "hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead.",
         )
     elif not clipped:
         yield Judgement(
             subject="exposure",
             grade="good",
-            found=f"The brightest parts are {-top:.1f} stops below saturation, and at most {100 * worst:.1f} % of the "
-            "subject is clipped.",
+            found=f"The brightest parts are {-top:.1f} stops below {under}, and at most {100 * worst:.1f} % of "
+            "the subject is clipped.",
         )
     yield from clipped
 

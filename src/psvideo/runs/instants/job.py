@@ -1,6 +1,7 @@
 """What a run is asked for and what comes of it, as records: the whole job, a piece of it, what was found."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
@@ -57,7 +58,8 @@ class OverTime:
 class Job:
     """What all pieces of a run have in common: the take and its timing, what it is solved with, what is delivered.
 
-    ``subject`` is what its rounds share, None where nobody looked yet or each round is by itself.
+    ``subject`` is what its rounds share, None where nobody looked yet or each round is by itself. ``shown_at_hz`` is the
+    rate of the sequence where pictures have none of their own.
     """
 
     take: Take
@@ -69,6 +71,7 @@ class Job:
     fill: bool = True
     start_number: int = FIRST_NUMBER
     subject: Subject | None = None
+    shown_at_hz: Fraction | None = None
 
     @property
     def solving(self) -> Solving:
@@ -90,7 +93,8 @@ class Job:
     @cached_property
     def tags(self) -> Tags:
         """What every file says of itself."""
-        return tags_of(self.take.clip, self.lighting.rig_path, self.delivery.space, self.over_time.aligning.rate)
+        tags = tags_of(self.take.clip, self.lighting.rig_path, self.delivery.space, self.over_time.aligning.rate)
+        return tags if self.shown_at_hz is None else replace(tags, fps=self.shown_at_hz)
 
     @property
     def shaping(self) -> Shaping | None:
