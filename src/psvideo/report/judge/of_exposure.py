@@ -51,8 +51,8 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
             grade="bad" if top < DARK_STOPS - unused_stops else "doubtful",
             found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
             f"{under}, so noise is large.",
-            advice=f"Open the aperture by about {_half(BEST_STOPS - unused_stops - top)}, or flash longer or stronger. Where files "
-            "hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead.",
+            advice=f"Open the aperture by about {_half(BEST_STOPS - unused_stops - top)}, or flash longer or stronger. "
+            "Where files hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead.",
         )
     elif not clipped:
         yield Judgement(

@@ -58,8 +58,8 @@ class OverTime:
 class Job:
     """What all pieces of a run have in common: the take and its timing, what it is solved with, what is delivered.
 
-    ``subject`` is what its rounds share, None where nobody looked yet or each round is by itself. ``shown_at_hz`` is the
-    rate of the sequence where pictures have none of their own.
+    ``subject`` is what its rounds share, None where nobody looked yet or each round is by itself. ``shown_at_hz`` is
+    the rate of the sequence where pictures have none of their own.
     """
 
     take: Take
