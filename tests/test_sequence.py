@@ -205,7 +205,7 @@ def of_light_a(plan: Plan, lights: dict[str, np.ndarray]) -> list[LightPlate]:
 def uneven(plan: Plan, brightest: float) -> np.ndarray:
     """A picture from black to its brightest, across and along."""
     rows, cols = np.mgrid[0 : plan.camera.height_px, 0 : plan.camera.width_px]
-    return (brightest * (0.15 + 0.85 * (0.5 + 0.5 * np.sin(rows / 9) * np.cos(cols / 11)))).astype(np.float32)
+    return np.asarray(brightest * (0.15 + 0.85 * (0.5 + 0.5 * np.sin(rows / 9) * np.cos(cols / 11))), np.float32)
 
 
 def test_flashes_of_several_lights_that_clip_do_not_look_like_motion(make_plan: PlanMaker) -> None:
