@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.several_lights.filled import Filled, coarser, filled_of, vague_between
+from psvideo.plates.several_lights.clipped_flashes import Filled, coarser, filled_of, vague_between
 
 WIDTH_PX = 480
 TOE = 0.02

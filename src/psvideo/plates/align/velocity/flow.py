@@ -16,7 +16,7 @@ from psvideo.compute.ranks import quantile
 from psvideo.model.coded import Image
 from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.several_lights.filled import Filled, coarser, filled_of, vague_between
+from psvideo.plates.several_lights.clipped_flashes import Filled, coarser, filled_of, vague_between
 
 Codes = NDArray[np.uint8]
 Vectors = NDArray[np.float32]
