@@ -20,8 +20,7 @@ from psvideo.solve.instants import subject_of
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
-from psvideo.solve.normals.robust.reflectance_fit import _rough as rough_in_the_fit
+from psvideo.solve.normals.robust.reflectance_kernel import fill_roughness_in_the_fit
 from psvideo.solve.normals.robust.reflecting import _rough as rough_in_loops
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
@@ -238,13 +237,9 @@ def test_what_roughness_gains_with_a_turn_is_its_slope_in_the_loop_and_in_the_fi
     in_loops = np.empty((3, len(cosine)), np.float32)
     fill_roughness(np.stack([cosine, facing, towards]).astype(np.float32), in_loops)
     np.testing.assert_allclose(in_loops, slopes, rtol=1e-3, atol=1e-5)
-    lights = np.zeros((1, len(cosine), 3))
-    lights[0, :, 2] = towards
-    points = SubjectPoints(
-        measured=lights[..., 0], counts=lights[..., 0], towards=lights, half=lights, normals=lights[0]
-    )
-    in_fit = rough_in_the_fit(points, np.outer(facing, (0, 0, 1)), cosine[None])
-    np.testing.assert_allclose([each[0] for each in in_fit], slopes, rtol=1e-3, atol=1e-5)
+    in_fit = np.empty((3, len(cosine)))
+    fill_roughness_in_the_fit(np.stack([cosine, facing, towards]), in_fit)
+    np.testing.assert_allclose(in_fit, slopes, rtol=1e-3, atol=1e-5)
 
 
 def test_near_lights_show_the_same_sheen() -> None:

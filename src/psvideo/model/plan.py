@@ -8,6 +8,7 @@ skip them. The *cycle*, which repeats exactly, is as many rounds as that pattern
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -89,27 +90,27 @@ class Plan:
     dark_every: int = 1
     dark_code: int = 0
 
-    @property
+    @cached_property
     def lights(self) -> tuple[str, ...]:
         """The lights' names in the order in which the plan first lights them."""
         return tuple(dict.fromkeys(name for flash in self.flashes for name in flash.lit))
 
-    @property
+    @cached_property
     def lit_slots(self) -> tuple[int, ...]:
         """The slots in which any light is on."""
         return tuple(slot for slot, flash in enumerate(self.flashes) if not flash.is_dark)
 
-    @property
+    @cached_property
     def shortest_flash_s(self) -> float:
         """How long the shortest flash lasts that lights anything. Raises ValueError where all slots are dark."""
         return min(self.flashes[slot].duration_s for slot in self.lit_slots)
 
-    @property
+    @cached_property
     def dark_rounds(self) -> tuple[bool, ...]:
         """Which rounds of a cycle keep their dark slots, the first always."""
         return maximal_length(self.dark_code) if self.dark_code else (True, *[False] * (self.dark_every - 1))
 
-    @property
+    @cached_property
     def cycle_slots(self) -> tuple[int, ...]:
         """The slots of one cycle, round by round, with dark slots in those that keep them."""
         every, lit = tuple(range(len(self.flashes))), self.lit_slots
@@ -120,7 +121,7 @@ class Plan:
         """How far the strobe's clock may be from the camera's, either way."""
         return UNKNOWN_CLOCK_PPM if self.clock_tolerance_ppm is None else self.clock_tolerance_ppm
 
-    @property
+    @cached_property
     def cycle_s(self) -> float:
         """The cycle's length in strobe seconds."""
         return sum(self.flashes[slot].duration_s + self.dark_s for slot in self.cycle_slots)
@@ -136,6 +137,13 @@ class Plan:
         rows = [[self.flashes[slot].lights.get(name, 0.0) for name in self.lights] for slot in self.lit_slots]
         return np.array(rows, np.float64).reshape(len(self.lit_slots), len(self.lights))
 
+    @cached_property
+    def _cycle(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+        """Slots, starts and lengths of one cycle's flashes: a fit asks for its train some hundred times."""
+        slots = np.array(self.cycle_slots, np.intp)
+        durations_s = np.array([self.flashes[slot].duration_s for slot in slots], np.float64)
+        return slots, np.concatenate([[0.0], np.cumsum(durations_s + self.dark_s)[:-1]]), durations_s
+
     def powers(self, light: str) -> tuple[float, ...]:
         """Return a light's power in every flash of the list, 0 where it is off."""
         return tuple(flash.lights.get(light, 0.0) for flash in self.flashes)
@@ -145,9 +153,7 @@ class Plan:
 
         Flash 0 is the cycle's first; negative ``first`` reaches into the cycles before.
         """
-        slots = np.array(self.cycle_slots, np.intp)
-        durations_s = np.array([self.flashes[slot].duration_s for slot in slots], np.float64)
-        starts_s = np.concatenate([[0.0], np.cumsum(durations_s + self.dark_s)[:-1]])
+        slots, starts_s, durations_s = self._cycle
         cycle, place = np.divmod(np.arange(first, first + count), len(slots))
         return FlashTrain(
             slot=slots[place], start_s=cycle * self.cycle_s + starts_s[place], duration_s=durations_s[place]

@@ -29,7 +29,8 @@ class FoundClock:
     def shifted(self, shift_s: float, ppm: float, *, pivot_s: float) -> "FoundClock":
         """Return this clock moved by ``shift_s`` and made faster by ``ppm``, turning about ``pivot_s``."""
         phase_s = self.phase_s + shift_s + (self.phase_s - pivot_s) * ppm * 1e-6
-        return replace(self, phase_s=phase_s, offset_ppm=self.offset_ppm + ppm * self.rate)
+        offset_ppm = self.offset_ppm + ppm * self.rate
+        return FoundClock(phase_s=phase_s, offset_ppm=offset_ppm, knot_s=self.knot_s, bend_s=self.bend_s)
 
     def bent(self, knot_s: FloatArray, shift_s: FloatArray) -> "FoundClock":
         """Return this clock with ``shift_s`` (knot,) added to its bends at the given knots."""

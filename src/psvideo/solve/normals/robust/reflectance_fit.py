@@ -10,7 +10,7 @@ towards the light is r = c max(l . v - c n . v, 0) / max(c, n . v), with v to th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
 from psvideo.model.surface import Reflectance
-from psvideo.solve.normals.task import BROAD, FEW, MIDDLE, NARROW, Mask
+from psvideo.solve.normals.task import Mask
 
 Values = NDArray[np.float64]
 
@@ -42,17 +42,11 @@ LEAST_ROUGH = 0.1
 PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3), 300.0
 """The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
-POWERS, MOST_BRIGHT = np.array([BROAD, MIDDLE, NARROW], np.float64)[:, None, None], 5.0
-"""Of the darkest points highlights are taken for this many times the albedo at most, while the model is fitted."""
 MOST_CURVE, MOST_ROUGH, MOST_LOBE = 0.6, 1.5, 5.0
-LEAST_FACING = 0.05
-"""Of the cosines that roughness is divided by."""
-MODEL_WIDTH, WIDTH = 2.0, 0.6
-"""Cauchy's width in standard deviations: of all residuals for the model, of a pixel's own for its normal."""
+MODEL_WIDTH = 2.0
+"""Cauchy's width in standard deviations of all residuals."""
 OUTLYING = 3.0
 """Shadows' edges and narrow highlights are few, and far off."""
-LEAST_SHARE = 0.01
-"""A pixel's residuals are at least this share of its light."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +69,11 @@ class SubjectPoints:
             towards=self.towards[:, known],
             half=self.half[:, known],
             normals=self.normals[known],
-        )
+        ).in_order()
+
+    def in_order(self) -> "SubjectPoints":
+        """Return the same points as compiled loops take them: numbers lie in the order of their axes."""
+        return SubjectPoints(**{one.name: np.ascontiguousarray(getattr(self, one.name)) for one in fields(self)})
 
 
 def joined(looks: Sequence[SubjectPoints]) -> SubjectPoints:
@@ -134,7 +132,7 @@ def alternated(
 ) -> ModelFollowed:
     """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
     than the ``least``."""
-    nothing = ModelFollowed(np.zeros(NUMBERS), 0.0, g)
+    points, nothing = points.in_order(), ModelFollowed(np.zeros(NUMBERS), 0.0, g)
     model, explained = np.zeros(NUMBERS), 0.0
     for turn in range(turns):
         model, explained = _model(points, g, typical, rough=rough)
@@ -148,8 +146,9 @@ def alternated(
 def explained_evenly(points: SubjectPoints, g: Values, typical: float, model: Values) -> float:
     """Return which share of the squares of what is left over a model explains, where no measurement counts less than
     others but for OUTLYING times what is typical: what weights found in noise is gone."""
+    points = points.in_order()
     parts = _parts(points, g, typical)
-    left = parts - _explained(points.towards, points.counts, parts)
+    left = _left(points, points.counts, parts)
     most = OUTLYING**2 * float((points.counts * left[0] ** 2).sum() / max(points.counts.sum(), 1))
     rest = left[0] - np.tensordot(model, left[1:], axes=1)
     before, after = (float((points.counts * np.minimum(each**2, most)).sum()) for each in (left[0], rest))
@@ -172,32 +171,22 @@ def _medians(values: Values, counts: Mask) -> Values:
     return np.where(number > 0, (lower + upper) / 2, 0.0)
 
 
-def _angles(points: SubjectPoints, g: Values) -> tuple[Values, Values, Values, Values]:
-    """Return sizes (point,), normals (point, 3), and their cosines to lights and half ways (light, point)."""
-    size = np.linalg.norm(g, axis=1)
-    normals = g / size[:, None]
-    c = (points.towards * normals).sum(axis=-1)
-    return size, normals, c, np.maximum((points.half * normals).sum(axis=-1), 0)
-
-
-def _rough(points: SubjectPoints, normals: Values, c: Values) -> tuple[Values, Values, Values]:
-    """Return what rough surfaces add (light, point), and what it gains with c and with the cosine to the camera."""
-    facing, towards = np.maximum(normals[:, 2], LEAST_FACING), points.towards[..., 2]
-    back = ((c > 0) & (towards > c * normals[:, 2])).astype(np.float64)
-    over = c > facing  # of the two angles this one is less
-    shares = back * np.where(over, 1.0, c / facing)
-    by_c = back * np.where(over, -facing, towards / facing - 2 * c)
-    by_z = -shares * np.where(over, c, towards / facing)
-    return shares * (towards - c * facing), by_c, by_z
-
-
 def _parts(points: SubjectPoints, g: Values, typical: float) -> Values:
     """Return what was measured, in albedos, and what each number of the model would add, (part, light, point)."""
-    size, normals, c, h = _angles(points, g)
-    lit = c > 0
-    back, _, _ = _rough(points, normals, c)
-    bright = lit * np.minimum(typical / size, MOST_BRIGHT)
-    return np.concatenate([[points.measured / size, c * c * lit, back], bright * h**POWERS])
+    from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
+
+    parts = np.empty((1 + NUMBERS, *points.measured.shape))
+    fill_parts(points.measured, points.towards, points.half, g, typical, parts)
+    return parts
+
+
+def _left(points: SubjectPoints, weights: Values, parts: Values) -> Values:
+    """Return what a vector of each pixel's own leaves of parts (part, light, point)."""
+    from psvideo.solve.normals.robust.reflectance_kernel import take_off_own
+
+    left = np.empty_like(parts)
+    take_off_own(points.towards, weights, parts, left)
+    return left
 
 
 def _model(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> tuple[Values, float]:
@@ -205,17 +194,19 @@ def _model(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> 
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
     """
+    from psvideo.solve.normals.robust.reflectance_kernel import add_squares
+
     parts = _parts(points, g, typical)
     weights, model, spread = points.counts, np.zeros(NUMBERS), 1.0
-    left = parts
+    left, square, right = parts, np.empty((NUMBERS, NUMBERS)), np.empty(NUMBERS)
     for turn in range(REWEIGHTED):
-        left = parts - _explained(points.towards, weights, parts)
+        left = _left(points, weights, parts)
         own, others = left[0], left[1:]
         rest = own - np.tensordot(model, others, axes=1)
         spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), 1e-4)
         per = COUNTED / spread**2 / points.counts.sum()
-        square = per * np.einsum("lp,klp,jlp->kj", weights, others, others) + np.diag(np.array(PRIOR) ** -2)
-        model = _bounded(square, per * np.einsum("lp,klp,lp->k", weights, others, own), rough=rough)
+        add_squares(weights, left, square, right)
+        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, rough=rough)
         rest = own - np.tensordot(model, others, axes=1)
         if turn < REWEIGHTED - 1:
             weights = points.counts / (1 + (rest / (MODEL_WIDTH * spread)) ** 2)
@@ -226,52 +217,19 @@ def _model(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> 
 def _bounded(square: Values, right: Values, *, rough: bool) -> Values:
     """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, and
     what is ``rough`` is not dark under grazing light as well."""
-    least = (-MOST_CURVE, 0.0, 0.0, 0.0, 0.0)
-    most = (0.0 if rough else MOST_CURVE, MOST_ROUGH if rough else 0.0, MOST_LOBE, MOST_LOBE, MOST_LOBE)
-    rows, wanted, found = square.tolist(), right.tolist(), [0.0] * NUMBERS  # quicker than numpy's numbers one by one
-    for _ in range(50):  # coordinate descent: strictly convex
-        before = list(found)
-        for k, row in enumerate(rows):
-            other = wanted[k] - sum(a * b for n, (a, b) in enumerate(zip(row, found, strict=True)) if n != k)
-            found[k] = min(max(other / row[k], least[k]), most[k])
-        if found == before:
-            break
-    return np.array(found)
+    from psvideo.solve.normals.robust.reflectance_kernel import descend_within
 
-
-def _explained(towards: Values, weights: Values, parts: Values) -> Values:
-    """Return what a vector of each pixel's own explains of parts (part, light, point)."""
-    matrix = np.einsum("lp,lpi,lpj->pij", weights, towards, towards) + 1e-9 * np.eye(3)
-    right = np.einsum("lp,klp,lpi->pik", weights, parts, towards)
-    return np.asarray(np.einsum("lpi,pik->klp", towards, np.linalg.solve(matrix, right)))
+    least = np.array((-MOST_CURVE, 0.0, 0.0, 0.0, 0.0))
+    most = np.array((0.0 if rough else MOST_CURVE, MOST_ROUGH if rough else 0.0, MOST_LOBE, MOST_LOBE, MOST_LOBE))
+    found = np.empty(NUMBERS)
+    descend_within(square, right, least, most, found)
+    return found
 
 
 def _solved_again(points: SubjectPoints, g: Values, model: Values, typical: float) -> Values:
     """Return g after a step of reweighted Gauss and Newton under the model."""
-    size, normals, c, h = _angles(points, g)
-    lit = c > 0
-    bright = lit * np.minimum(typical / size, MOST_BRIGHT) * model[SHINE:, None, None]
-    rough, rough_by_c, rough_by_z = _rough(points, normals, c)
-    shine = size * (bright * h**POWERS).sum(axis=0)
-    by_c = 1 + 2 * model[0] * lit * c + model[ROUGH] * rough_by_c
-    by_z = model[ROUGH] * rough_by_z
-    by_h = (bright * POWERS * h ** (POWERS - 1)).sum(axis=0)
-    shade = c + model[0] * lit * c * c + model[ROUGH] * rough
-    along = shade - by_c * c - by_h * h - by_z * normals[:, 2]
-    matrix = along[..., None] * normals + by_c[..., None] * points.towards + by_h[..., None] * points.half
-    matrix[..., 2] += by_z
-    matte = points.measured - shine
-    rest = np.abs(matte - size * shade)
-    count = points.counts.sum(axis=0)
-    order = np.sort(np.where(points.counts > 0, rest, np.inf), axis=0)
-    middle = np.clip((count + 3) // 2 - 1, 0, np.maximum(count - 1, 0)).astype(np.intp)
-    typical = 1.48 * np.take_along_axis(order, middle[None], axis=0)[0]
-    spread = np.maximum(np.where(np.isfinite(typical), typical, 0), LEAST_SHARE * size)
-    width = WIDTH * np.minimum(1, np.sqrt(FEW / np.maximum(count, FEW)))
-    weights = points.counts / (1 + (rest / (width * spread)) ** 2)
-    square = np.einsum("lp,lpi,lpj->pij", weights, matrix, matrix)
-    square += (1e-6 * np.trace(square, axis1=1, axis2=2) + 1e-12)[:, None, None] * np.eye(3)
-    right = np.einsum("lp,lp,lpi->pi", weights, matte, matrix)
-    step = np.linalg.solve(square, right[..., None])[..., 0] - g
-    far = np.linalg.norm(step, axis=1)
-    return np.asarray(g + step * np.minimum(1, 0.3 * size / np.maximum(far, 1e-12))[:, None])
+    from psvideo.solve.normals.robust.reflectance_kernel import solve_again
+
+    found = np.empty_like(g)
+    solve_again(points.measured, points.counts, points.towards, points.half, g, model, typical, found)
+    return found

@@ -1,0 +1,225 @@
+"""The reflectance fit's loops over points and lights, compiled: numpy takes longer to call than to add up so few.
+
+Arrays are those of ``reflectance_fit.SubjectPoints``: (light, point), directions (light, point, 3).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import EXACT, FUSED
+from psvideo.solve.normals.task import FEW
+
+Values = NDArray[np.float64]
+
+DESCENTS = 50
+"""Mostly far fewer are needed."""
+LEAST_FACING = 0.05
+"""Of the cosines that roughness is divided by."""
+MOST_BRIGHT = 5.0
+"""Of the darkest points highlights are taken for this many times the albedo at most, while the model is fitted."""
+WIDTH = 0.6
+"""Cauchy's width in standard deviations of a pixel's own residuals, for its normal."""
+LEAST_SHARE = 0.01
+"""A pixel's residuals are at least this share of its light."""
+LONGEST_STEP = 0.3
+"""Of a normal times albedo, as a share of it."""
+
+
+@EXACT.kept
+def descend_within(square: Values, wanted: Values, least: Values, most: Values, found: Values) -> None:
+    """Fill ``found`` with the least of a strictly convex square form within bounds, number by number."""
+    size = len(found)
+    found[:] = 0.0
+    for _ in range(DESCENTS):
+        moved = False
+        for k in range(size):
+            other = 0.0
+            for n in range(size):
+                if n != k:
+                    other += square[k, n] * found[n]
+            now = min(max((wanted[k] - other) / square[k, k], least[k]), most[k])
+            moved = moved or now != found[k]
+            found[k] = now
+        if not moved:
+            break
+
+
+@FUSED.inlined
+def _roughness(c: float, facing: float, towards: float) -> tuple[float, float, float]:
+    """Return what rough surfaces add, and what it gains with the cosines to the light and to the camera."""
+    seen = max(facing, LEAST_FACING)
+    if not (c > 0.0 and towards > c * facing):
+        return 0.0, 0.0, 0.0
+    if c > seen:  # of the two angles this one is less
+        return towards - c * seen, -seen, -c
+    return c / seen * (towards - c * seen), towards / seen - 2 * c, -c / seen * towards / seen
+
+
+@FUSED.kept
+def fill_roughness_in_the_fit(angles: Values, found: Values) -> None:
+    """Fill ``found`` (3, angle) with what roughness adds and gains; ``angles`` (3, angle) are the cosines between
+    normal and light, normal and camera, light and camera."""
+    for n in range(angles.shape[1]):
+        found[0, n], found[1, n], found[2, n] = _roughness(angles[0, n], angles[1, n], angles[2, n])
+
+
+@FUSED.inlined
+def _along(ways: Values, light: int, point: int, normal: Values) -> float:
+    x, y, z = ways[light, point, 0], ways[light, point, 1], ways[light, point, 2]
+    return float(x * normal[0] + y * normal[1] + z * normal[2])
+
+
+@FUSED.inlined
+def _size_and_normal(g: Values, point: int, normal: Values) -> float:
+    size = float(np.sqrt(g[point, 0] ** 2 + g[point, 1] ** 2 + g[point, 2] ** 2))
+    for i in range(3):
+        normal[i] = g[point, i] / size
+    return size
+
+
+@FUSED.kept
+def fill_parts(measured: Values, towards: Values, half: Values, g: Values, typical: float, parts: Values) -> None:
+    """Fill ``parts`` (part, light, point): what was measured, in albedos, and what each number of the model adds."""
+    normal = np.empty(3)
+    for p in range(len(g)):
+        size = _size_and_normal(g, p, normal)
+        bright = min(typical / size, MOST_BRIGHT)
+        for light in range(len(measured)):
+            c, h = _along(towards, light, p, normal), max(_along(half, light, p, normal), 0.0)
+            lit = 1.0 if c > 0.0 else 0.0
+            h8 = ((h * h) ** 2) ** 2
+            h32 = (h8 * h8) ** 2
+            parts[0, light, p] = measured[light, p] / size
+            parts[1, light, p] = c * c * lit
+            parts[2, light, p] = _roughness(c, normal[2], towards[light, p, 2])[0]
+            parts[3, light, p] = lit * bright * h8
+            parts[4, light, p] = lit * bright * h32
+            parts[5, light, p] = lit * bright * (h32 * h32) ** 2
+
+
+@FUSED.inlined
+def _solve_symmetric(m: Values, x: Values) -> None:
+    """Solve with a positive definite matrix (its upper triangle row by row); the answer stands in ``x``."""
+    b, c = m[1] / m[0], m[2] / m[0]
+    d = m[3] - b * m[1]
+    t = m[4] - c * m[1]
+    e = t / d
+    f = m[5] - c * m[2] - e * t
+    y = x[1] - b * x[0]
+    x[2] = (x[2] - c * x[0] - e * y) / f
+    x[1] = y / d - e * x[2]
+    x[0] = x[0] / m[0] - b * x[1] - c * x[2]
+
+
+@FUSED.kept
+def take_off_own(towards: Values, weights: Values, parts: Values, left: Values) -> None:
+    """Fill ``left`` with what a vector of each pixel's own does not explain of the parts (part, light, point)."""
+    matrix, own = np.empty(6), np.empty(3)
+    for p in range(parts.shape[2]):
+        matrix[:] = 0.0
+        matrix[0] = matrix[3] = matrix[5] = 1e-9
+        for light in range(len(towards)):
+            x, y, z = towards[light, p, 0], towards[light, p, 1], towards[light, p, 2]
+            weight = weights[light, p]
+            matrix[0] += weight * x * x
+            matrix[1] += weight * x * y
+            matrix[2] += weight * x * z
+            matrix[3] += weight * y * y
+            matrix[4] += weight * y * z
+            matrix[5] += weight * z * z
+        for k in range(len(parts)):
+            own[:] = 0.0
+            for light in range(len(towards)):
+                for i in range(3):
+                    own[i] += weights[light, p] * parts[k, light, p] * towards[light, p, i]
+            _solve_symmetric(matrix, own)
+            for light in range(len(towards)):
+                left[k, light, p] = parts[k, light, p] - _along(towards, light, p, own)
+
+
+@FUSED.kept
+def add_squares(weights: Values, left: Values, square: Values, right: Values) -> None:
+    """Fill the model's normal equations: sums over lights and points of the weighted products of what each of its
+    numbers adds, ``left[1:]``, with each other and with what was measured, ``left[0]``."""
+    square[:], right[:] = 0.0, 0.0
+    size = len(right)
+    for light in range(weights.shape[0]):
+        for p in range(weights.shape[1]):
+            for k in range(size):
+                part = weights[light, p] * left[1 + k, light, p]
+                right[k] += part * left[0, light, p]
+                for j in range(k + 1):
+                    square[k, j] += part * left[1 + j, light, p]
+    for k in range(size):
+        for j in range(k):
+            square[j, k] = square[k, j]
+
+
+@FUSED.inlined
+def _typical(rest: Values, counts: Values, point: int, order: Values) -> float:
+    """Return what is typical of a point's residuals, of which normal and albedo have taken three."""
+    many = 0
+    for light in range(len(counts)):
+        if counts[light, point] > 0.0:
+            place = many
+            while place > 0 and order[place - 1] > rest[light]:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = rest[light]
+            many += 1
+    return 1.48 * order[min((many + 3) // 2 - 1, many - 1)] if many else 0.0
+
+
+@FUSED.kept
+def solve_again(
+    measured: Values, counts: Values, towards: Values, half: Values, g: Values, model: Values, typical: float,
+    found: Values,
+) -> None:  # fmt: skip
+    """Fill ``found`` with g (point, 3) after a step of reweighted Gauss and Newton under the model."""
+    lights = len(measured)
+    normal, matrix, right = np.empty(3), np.empty(6), np.empty(3)
+    rows, matte, rest, order = np.empty((lights, 3)), np.empty(lights), np.empty(lights), np.empty(lights)
+    for p in range(len(g)):
+        size = _size_and_normal(g, p, normal)
+        bright = min(typical / size, MOST_BRIGHT)
+        many = 0.0
+        for light in range(lights):
+            many += counts[light, p]
+            c, h = _along(towards, light, p, normal), max(_along(half, light, p, normal), 0.0)
+            lit = 1.0 if c > 0.0 else 0.0
+            added, added_by_c, added_by_z = _roughness(c, normal[2], towards[light, p, 2])
+            h7 = h * h * h * (h * h) ** 2
+            h31 = h7 * ((h7 * h) ** 2 * (h7 * h))
+            h127 = h31 * ((h31 * h) ** 2 * (h31 * h))
+            much = lit * bright
+            broad, middle, narrow = much * model[2], much * model[3], much * model[4]
+            matte[light] = measured[light, p] - size * h * (broad * h7 + middle * h31 + narrow * h127)
+            by_h = 8 * broad * h7 + 32 * middle * h31 + 128 * narrow * h127
+            by_c, by_z = 1 + 2 * model[0] * lit * c + model[1] * added_by_c, model[1] * added_by_z
+            shade = c + model[0] * lit * c * c + model[1] * added
+            along = shade - by_c * c - by_h * h - by_z * normal[2]
+            for i in range(3):
+                rows[light, i] = along * normal[i] + by_c * towards[light, p, i] + by_h * half[light, p, i]
+            rows[light, 2] += by_z
+            rest[light] = abs(matte[light] - size * shade)
+        spread = max(_typical(rest, counts, p, order), LEAST_SHARE * size)
+        width = WIDTH * min(1.0, np.sqrt(FEW / max(many, FEW)))
+        matrix[:], right[:] = 0.0, 0.0
+        for light in range(lights):
+            weight = counts[light, p] / (1 + (rest[light] / (width * spread)) ** 2)
+            x, y, z = rows[light, 0], rows[light, 1], rows[light, 2]
+            matrix[0] += weight * x * x
+            matrix[1] += weight * x * y
+            matrix[2] += weight * x * z
+            matrix[3] += weight * y * y
+            matrix[4] += weight * y * z
+            matrix[5] += weight * z * z
+            for i in range(3):
+                right[i] += weight * matte[light] * rows[light, i]
+        more = 1e-6 * (matrix[0] + matrix[3] + matrix[5]) + 1e-12
+        matrix[0], matrix[3], matrix[5] = matrix[0] + more, matrix[3] + more, matrix[5] + more
+        _solve_symmetric(matrix, right)
+        far = np.sqrt((right[0] - g[p, 0]) ** 2 + (right[1] - g[p, 1]) ** 2 + (right[2] - g[p, 2]) ** 2)
+        share = min(1.0, LONGEST_STEP * size / max(far, 1e-12))
+        for i in range(3):
+            found[p, i] = g[p, i] + share * (right[i] - g[p, i])
