@@ -30,7 +30,7 @@ FRAMES = 80
 
 @pytest.fixture
 def plan(make_plan: PlanMaker) -> Plan:
-    return make_plan(height_px=160, width_px=12)
+    return make_plan(height_px=96, width_px=12)
 
 
 def shot_of(plan: Plan, frames: int, ppm: float = 40.0) -> Exposure:
@@ -133,7 +133,7 @@ def test_a_pattern_with_a_hole_of_its_own_is_followed(plan: Plan) -> None:
 
 
 def test_an_unknown_clock_and_readout_do_not_hide_a_pattern(make_plan: PlanMaker) -> None:
-    plan = make_plan(height_px=160, width_px=12, readout=0.7, clock_tolerance_ppm=10_000)
+    plan = make_plan(height_px=80, width_px=12, readout=0.7, clock_tolerance_ppm=10_000)
     unknown = replace(plan, clock_tolerance_ppm=None, camera=replace(plan.camera, readout_s=None))
     shown = pattern("6/5", 2)
     profiles = shot_of(plan, int(shown.max()) + 1, 6000.0).frames[shown].mean(axis=2, dtype=np.float64)
@@ -147,12 +147,12 @@ def test_frames_missing_all_over_without_a_pattern_are_found(plan: Plan) -> None
 
     Where holes lie close together, a frame or two between them may be placed wrongly; the flashes are not.
     """
-    shown = np.sort(np.random.default_rng(1).choice(300, 264, replace=False))
+    shown = np.sort(np.random.default_rng(1).choice(200, 176, replace=False))
     shown = shown - shown[0]
     timing = retimed(plan, shown)
     places = places_in_time(timing, range(len(shown)))
     assert sum(places[n] == shown[n] for n in places) >= len(shown) - 5
-    assert rms_rows(timing, plan, 300) < 0.05
+    assert rms_rows(timing, plan, 200) < 0.05
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -166,8 +166,14 @@ def test_a_hole_beside_the_very_last_or_first_frames_is_found(end: str, gone: in
     assert rms_rows(timing, plan, int(shown.max()) + 1) < 0.05
 
 
-@pytest.mark.parametrize("gone", [2, 3])
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize(
+    ("count", "gone"),
+    [
+        pytest.param(count, gone, marks=() if (count + gone) % 2 else pytest.mark.campaign)
+        for count in (1, 2, 3, 4, 5)
+        for gone in (2, 3)
+    ],
+)
 @pytest.mark.parametrize("end", ["first", "last"])
 def test_a_hole_after_a_few_frames_of_a_short_clip_is_found(end: str, count: int, gone: int, plan: Plan) -> None:
     """Frames at wrong places would spoil the brightnesses by which all others are judged."""

@@ -41,7 +41,14 @@ flash_s = 0.001
 clock_offset_ppm = 40.0
 {LIT_BALL}"""
 """Enough samples for several parts of the fit and several bands of the solution, in pictures that cost little."""
-BUSY = "while True: pass"
+BUSY = """
+from time import perf_counter, sleep
+while True:
+    until_s = perf_counter() + 0.004
+    while perf_counter() < until_s:
+        pass
+    sleep(0.004)
+"""
 Digest = dict[str, str]
 PER_RUN = ("report.json", "report.html")
 """They hold the command, and with it the output's name and --resume."""
@@ -137,7 +144,7 @@ def digest(out: Path) -> Digest:
 
 @contextmanager
 def load() -> Iterator[None]:
-    """Keep the machine busy with two endless loops."""
+    """Keep the machine busy with two loops that come and go, which is worse to threads than loops that stay."""
     loops = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
     try:
         yield
