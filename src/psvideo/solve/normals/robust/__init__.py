@@ -10,5 +10,5 @@ A block of pixels goes through ``robust_kernel``:
 5. ``predicted_error``: each normal's standard error
 
 Where a subject is not matte, ``reflectance`` takes points of it, ``reflectance_fit`` fits to them how it reflects
-light, and ``reflecting`` solves its pixels again with that.
+light (its loops are ``reflectance_kernel``), and ``reflecting`` solves its pixels again with that.
 """
