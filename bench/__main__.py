@@ -15,6 +15,7 @@ TABLES = (
     "hostile",
     "hostile_runs",
     "killed",
+    "killed_workers",
     "soak",
     "view",
     "live",

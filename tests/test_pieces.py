@@ -41,6 +41,7 @@ from psvideo.runs.instants.job import Found
 from psvideo.runs.instants.piece_notes import noted, write_notes
 from psvideo.runs.instants.pieces import cut, piece_named
 from psvideo.runs.many_takes import handed_out
+from psvideo.runs.many_takes.cluster import Cluster, connected
 from psvideo.solve import steady
 
 CLIPS: dict[str, dict[str, Any]] = {
@@ -492,6 +493,27 @@ def _when_solving(beside: Path, parent: psutil.Process) -> list[psutil.Process]:
     while not (beside / ".pieces" / "timing.json").is_file() and time.monotonic() < until_s:
         time.sleep(0.05)
     return [one for one in parent.children(recursive=True) if any("spawn_main" in word for word in one.cmdline())]
+
+
+@pytest.mark.parametrize(("deaths", "starts"), [(1, 2), (9, 2)])
+def test_workers_that_die_while_they_start_are_started_once_more(
+    deaths: int, starts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process that is killed before it has answered ends dask's cluster with RuntimeError."""
+    begun: list[int] = []
+
+    def local(**given: Any) -> Any:
+        begun.append(given["n_workers"])
+        if len(begun) <= deaths:
+            raise RuntimeError("Nanny failed to start.")
+        return contextlib.nullcontext("a cluster")
+
+    monkeypatch.setattr("distributed.LocalCluster", local)
+    monkeypatch.setattr("distributed.Client", lambda cluster, **_: contextlib.nullcontext(cluster))
+    expected = pytest.raises(PsvideoError, match="`workers` 3: the processes end") if deaths > 1 else None
+    with expected or contextlib.nullcontext(), connected(Cluster(workers=3)) as client:
+        assert client == "a cluster"
+    assert begun == [3] * starts
 
 
 def test_what_cannot_be_shared_is_refused_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

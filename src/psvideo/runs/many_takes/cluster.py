@@ -10,7 +10,7 @@ from psvideo.compute.threads import THREADS, thread_count
 from psvideo.errors import PsvideoError, UsageError
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 EXTRA = (
     "`workers` and `scheduler` need dask, an extra: python -m pip install 'psvideo[dask]'. Without it one process "
@@ -58,30 +58,48 @@ def require_dask() -> None:
 def connected(cluster: Cluster) -> "Iterator[Client]":
     """Give a client of the cluster, which is ended with the block where it was started here.
 
-    Raises PsvideoError where no scheduler answers.
+    Raises PsvideoError where no scheduler answers, or no workers can be started here.
     """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     if cluster.scheduler is not None:
         with _unlogged(), _joined(cluster.scheduler) as client:
             yield client
         return
-    count = cluster.workers or 1
     with (
         _unlogged(),
         dask.config.set(SETTINGS),
-        LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            memory_limit=0,
-            dashboard_address="127.0.0.1:0",  # else a port that others may have
-            env={THREADS: str(max(thread_count() // count, 1))},
-            silence_logs=50,
-        ) as local,
+        _started(cluster.workers or 1) as local,
         Client(local, set_as_default=False) as client,
     ):
         yield client
+
+
+def _started(count: int) -> "LocalCluster":
+    """Return so many workers, each a process here; raises PsvideoError where they die twice before they have answered."""
+    with contextlib.suppress(RuntimeError):
+        return _local(count)
+    try:
+        return _local(count)
+    except RuntimeError as fault:
+        raise PsvideoError(
+            f"`workers` {count}: the processes end as soon as they are started ({fault}). Perhaps memory or processes "
+            "run out: start fewer, or leave `workers` out. What was solved before is kept for `resume`."
+        ) from fault
+
+
+def _local(count: int) -> "LocalCluster":
+    from distributed import LocalCluster
+
+    return LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        memory_limit=0,
+        dashboard_address="127.0.0.1:0",  # else a port that others may have
+        env={THREADS: str(max(thread_count() // count, 1))},
+        silence_logs=50,
+    )
 
 
 def _joined(address: str) -> "Client":
