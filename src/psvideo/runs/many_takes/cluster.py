@@ -77,7 +77,7 @@ def connected(cluster: Cluster) -> "Iterator[Client]":
 
 
 def _started(count: int) -> "LocalCluster":
-    """Return so many workers, each a process here; raises PsvideoError where they die twice before they have answered."""
+    """Return so many workers, each a process here; raises PsvideoError where they die twice before they answer."""
     with contextlib.suppress(RuntimeError):
         return _local(count)
     try:
