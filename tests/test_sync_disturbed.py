@@ -380,6 +380,7 @@ def test_flashes_of_different_lengths_are_timed_and_named(dark: bool, make_plan:
     assert timing.order == "marker"
 
 
+@pytest.mark.campaign  # of half as many frames: test_sync_moving.py
 def test_everything_at_once_is_borne(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=160, width_px=COLUMNS, readout=0.7, clock_tolerance_ppm=10_000)
     slow = replace(plan, fall_s=5e-5)

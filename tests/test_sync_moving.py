@@ -10,7 +10,7 @@ from bench.timing_scenes import plan_of, rolling_stripes, tumbling
 
 from psvideo.errors import NoStrobeError
 from psvideo.model.rows.row_profiles import collect_with_doubt
-from psvideo.model.timing import Timing
+from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import first_guess
@@ -35,6 +35,8 @@ def timed(case: Case, seed: int) -> tuple[Timing, float]:
 
 def test_slow_leds_show_on_a_subject_that_tumbles_with_everything_else_unknown() -> None:
     timing, off_rows = timed(replace(EVERYTHING, frames=150), seed=1)
+    assert timing.order == "marker"
+    assert timing.dropped_frames == (DroppedFrames(after=119, count=1),)
     assert timing.fall_s == pytest.approx(5e-5, rel=0.1)
     assert off_rows < 0.15
     assert off_rows < 3 * timing.phase_error_rows
