@@ -152,6 +152,16 @@ def test_a_rate_that_divides_by_zero_is_refused(tmp_path: Path) -> None:
         exr.contents(path)
 
 
+def test_an_exr_whose_pixels_are_damaged_is_refused_for_them(tmp_path: Path) -> None:
+    path = tmp_path / "noise.exr"
+    write_exr(path, {"Y": np.random.default_rng(1).random((64, 64)).astype(np.float32)})
+    data = bytearray(path.read_bytes())
+    data[-3000:-2000] = bytes(1000)
+    path.write_bytes(data)
+    with pytest.raises(PsvideoError, match=r"noise\.exr: .*its pixels cannot be decoded"):
+        decode("exr", path)
+
+
 @pytest.mark.parametrize("read", [read_plan, read_rig, exr.contents, sha256_of, lambda path: decode("png", path)])
 def test_a_pipe_is_refused_where_a_file_is_expected(read: Callable[[Path], object], tmp_path: Path) -> None:
     path = tmp_path / "pipe"

@@ -137,6 +137,8 @@ def _open(path: Path, *, header_only: bool) -> Any:
         raise PsvideoError(f"{path}: ends before its last rows: it is truncated. Copy it again.")
     try:
         file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+        if not file.parts:  # pixels that cannot be decoded are no error to it, but a file of nothing
+            raise ValueError("its pixels cannot be decoded")
         file.header()
     except MemoryError:
         raise
