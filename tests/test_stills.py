@@ -171,6 +171,27 @@ def test_pictures_without_names_belong_to_lights_by_order_and_the_report_says_so
     assert error_deg(tmp_path / "out") < 1
 
 
+@pytest.mark.parametrize(("left_aside", "named"), [("room light", True), ("black", False), ("another light", False)])
+def test_a_picture_without_a_light_that_may_show_the_room_is_named(
+    left_aside: str, named: bool, tmp_path: Path
+) -> None:
+    ambient = 0.1 * (1 + np.mgrid[:SIZE, :SIZE][0] / SIZE)
+    shown = {"room light": ambient, "black": 0.001 * ambient, "another light": lit()[2] + ambient}[left_aside]
+    folder = photographs(tmp_path / "photos", [np.clip(one + ambient, 0, 1) for one in lit()])
+    save16(folder / "IMG_0007.png", shown)
+    lights = listed(tmp_path / "lights.lp", NAMES)
+    report = ps.stills(folder, lights=lights, out=tmp_path / "out", transfer="linear")
+    assert "Left aside: IMG_0007.png" in remarks(report)
+    said = "IMG_0007.png belongs to no light and is nowhere brighter than the others"
+    assert (said in remarks(report)) == named
+
+
+def test_pictures_a_folder_deeper_are_pointed_to(tmp_path: Path) -> None:
+    photographs(tmp_path / "photos", lit())
+    with pytest.raises(PsvideoError, match="The folder photos in it holds pictures: name that one"):
+        ps.stills(tmp_path, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+
+
 def test_a_dark_picture_is_taken_off_and_a_mask_is_used_where_they_are_named_so(tmp_path: Path) -> None:
     normals, inside = ball()
     folder = photographs(tmp_path / "photos", lit(ambient=0.1))

@@ -91,6 +91,9 @@ def _instead(folder: Path) -> str:
         return "It is a clip with its plan: psvideo normals takes it."
     kinds = ", ".join(USUAL_KINDS)
     expected = f"Expected still photographs, one per light ({kinds}), or a folder of plates per light."
+    inner = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and pictures_in(entry)]
+    if len(inner) == 1:
+        expected += f" The folder {inner[0].name} in it holds pictures: name that one."
     return f"{expected} {unread_in(folder)}".rstrip()
 
 

@@ -19,7 +19,7 @@ from psvideo.model.camera import Camera
 from psvideo.model.plan import PlannedFlash, assemble_plan
 from psvideo.model.rig import Rig
 from psvideo.runs.photographs.rti import write_rti
-from psvideo.runs.photographs.still_doubts import curve_doubt, exposures_of, glance_at
+from psvideo.runs.photographs.still_doubts import curve_doubt, dark_doubt, exposures_of, glance_at
 from psvideo.runs.photographs.still_rig import KnownLights, lens_stated
 from psvideo.solve.instants import Instant
 
@@ -73,7 +73,8 @@ def still_clip(
     write_text(place / PLAN, format_plan(plan))
     notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *lens, *_aside(pairs))
     clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
-    warned = (*clip.warnings, *known.warnings, *([warning] if warning else []))
+    doubts = (warning, dark_doubt(glance, pictures, pairs.aside))
+    warned = (*clip.warnings, *known.warnings, *(one for one in doubts if one))
     return StillClip(clip=replace(clip, curve_doubt=doubt or "", warnings=warned), rig=rig, rig_path=place / RIG)
 
 

@@ -5,12 +5,15 @@ A matte surface under known lights leaves small residuals; a wrong assumption ma
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip.decode.decoders import opened
+from psvideo.clip.decode.decoders import opened, read_header
+from psvideo.clip.folder import KINDS
 from psvideo.clip.in_file import RowsInFile
+from psvideo.clip.reading import looks
 from psvideo.clip.stills import Photographs
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.model.camera import FloatArray
@@ -37,6 +40,9 @@ IN_CODES = 0.98
 light that is a straight line of codes their noise is less. (Linear pictures that were read as sRGB: 0.29 to 0.96; sRGB
 as it is: 1.00 and more.)"""
 OTHER_EXPOSURE = 1.05
+ALIKE, NEARLY_ALL, LEAST_AMBIENT = 0.02, 0.99, 0.05
+"""A picture of the room's light is brighter than no other by more than noise of 8 bits, at nearly all of its pixels,
+and brighter than black: this share of a typical signal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,17 +112,40 @@ def glance_at(pictures: Photographs, lights: Sequence[Light]) -> Glance | None:
     directions = [light.direction for light in lights if light.direction is not None]
     if len(directions) < max(len(lights), LEAST_LIGHTS) or pictures.header.bits is None:
         return None
-    signals = []
-    for file in pictures.files:
-        codes = opened(pictures.kind, file).codes
-        step = max(int(np.sqrt(codes.shape[0] * codes.shape[1] / POINTS)), 1)
-        rows = np.arange(step // 2, codes.shape[0], step)
-        some = codes.some(rows)[rows - rows[0]] if isinstance(codes, RowsInFile) else codes[rows]
-        thin = some[:, step // 2 :: step].astype(np.float64) / (2**pictures.header.bits - 1)
-        signals.append((thin if thin.ndim == 2 else thin[..., 1]).ravel())
+    signals = [_thin(pictures, file) for file in pictures.files]
     green = [light.intensity[min(1, len(light.intensity) - 1)] for light in lights]
     dark = signals.pop() if len(signals) > len(lights) else None
     return Glance(signals=np.array(signals), dark=dark, directions=np.array(directions), strengths=np.array(green))
+
+
+def _thin(pictures: Photographs, file: Path) -> FloatArray:
+    """Return the signals of a few pixels of a picture of such a kind, in its second channel, shape (pixel,)."""
+    codes = opened(pictures.kind, file).codes
+    step = max(int(np.sqrt(codes.shape[0] * codes.shape[1] / POINTS)), 1)
+    rows = np.arange(step // 2, codes.shape[0], step)
+    some = codes.some(rows)[rows - rows[0]] if isinstance(codes, RowsInFile) else codes[rows]
+    thin = some[:, step // 2 :: step].astype(np.float64) / (2 ** (pictures.header.bits or 0) - 1)
+    return np.asarray((thin if thin.ndim == 2 else thin[..., 1]).ravel(), np.float64)
+
+
+def dark_doubt(glance: Glance | None, pictures: Photographs, aside: Sequence[Path]) -> str | None:
+    """Say which picture that belongs to no light (``aside``) may show the scene with every light off: it is as large
+    and of the same kind, brighter than none of the others anywhere, and not black."""
+    if glance is None or glance.dark is not None:
+        return None
+    least, black = glance.signals.min(axis=0), np.median(glance.signals) * LEAST_AMBIENT
+    for file in aside:
+        if KINDS.get(file.suffix.lower()) != pictures.kind or looks(read_header(pictures.kind, file)) != looks(
+            pictures.header
+        ):
+            continue
+        shown = _thin(pictures, file)
+        if np.mean(shown <= least + ALIKE) > NEARLY_ALL and np.median(shown) > black:
+            return (
+                f"{file.name} belongs to no light and is nowhere brighter than the others. If it shows the scene with "
+                f"every light off, say `dark={str(file)!r}`: its light is in all pictures then, and tilts normals."
+            )
+    return None
 
 
 def curve_doubt(glance: Glance | None, pictures: Photographs) -> str | None:
