@@ -1,7 +1,10 @@
 """Damaged and hostile files are read or refused with one paragraph that names them: no crash, no hang, no flood."""
 
+import json
 import os
 import struct
+import subprocess
+import sys
 import zlib
 from collections.abc import Callable
 from fractions import Fraction
@@ -192,3 +195,19 @@ def test_whole_commands_do_no_harm_on_hostile_folders(tmp_path: Path) -> None:
     found = [one for _, one in islice(tried(tmp_path, seed=5), 60)]
     assert not [f"{' '.join(one.words)}: {one.why}: {one.fault}: {one.said}" for one in found if one.fault]
     assert {one.status for one in found} >= {0, 1}
+
+
+def test_json_stays_json_where_a_library_prints_of_damage(tmp_path: Path) -> None:
+    """OpenEXR's binding prints a warning of damaged pixels on Python's standard output."""
+    for number in range(3):
+        path = tmp_path / f"shot_{number}.exr"
+        write_exr(path, {"Y": np.random.default_rng(number).random((64, 64)).astype(np.float32)})
+    data = bytearray(path.read_bytes())
+    data[-3000:-2000] = bytes(1000)
+    path.write_bytes(data)
+    command = [sys.executable, "-m", "psvideo", "info", "--json", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 1
+    texts = [finding["text"] for finding in json.loads(done.stdout)["findings"]]
+    assert any("shot_2.exr: cannot be read as OpenEXR" in text for text in texts)
+    assert "Traceback" not in done.stderr

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import compiling_said
+from psvideo.cli.console import compiling_said, libraries_aside
 from psvideo.cli.ending import check_addresses, nobody_reads, paragraph_on, say_any_name, starving_said, stoppable
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
@@ -87,7 +87,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
     with compiling_said(quiet="-q" in words or "--quiet" in words), starving_said():
         try:
-            return _ended(words)
+            with libraries_aside(words):
+                return _ended(words)
         except (OSError, MemoryError, ImportError, RuntimeError) as fault:
             return _broken_off(fault)
 

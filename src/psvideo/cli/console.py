@@ -27,6 +27,20 @@ COMPILING = logging.getLogger("psvideo.compiling")
 """Where ``compute.compiled`` says that it compiles; got by name, because loading that loads the compiler."""
 
 
+@contextlib.contextmanager
+def libraries_aside(words: Sequence[str]) -> Iterator[None]:
+    """In this block, what libraries print (OpenEXR a warning of damaged pixels) goes to stderr where ``words`` ask for
+    JSON, so that standard output holds nothing else."""
+    asked = "--json" in words and not {"-h", "--help"}.intersection(words)
+    with contextlib.redirect_stdout(sys.stderr) if asked and sys.stdout is sys.__stdout__ else contextlib.nullcontext():
+        yield
+
+
+def print_json(text: str) -> None:
+    """Print what machines read."""
+    print(text, file=sys.__stdout__ if sys.stdout is sys.stderr else sys.stdout, flush=True)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Voice:
     """How much a command says, and to whom; parameters in sentences are spelled as options. ``warned`` is what it
@@ -57,7 +71,7 @@ class Voice:
     def result(self, data: Mapping[str, object]) -> None:
         """Print the machine-readable result, where --json asked for it: one object, all that stdout gets."""
         if self.json:
-            print(json.dumps(spelled_within(data), indent=1), flush=True)
+            print_json(json.dumps(spelled_within(data), indent=1))
 
     def track(self, items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
         """Pass items through and show progress with rate and time left: a bar on a terminal, plain lines elsewhere."""

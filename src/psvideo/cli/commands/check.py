@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from psvideo.cli.console import Voice
+from psvideo.cli.console import Voice, print_json
 from psvideo.cli.options.clip_and_run import FirstLight, OrderRig, PlanPath, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.errors import UsageError
@@ -126,7 +126,7 @@ def _print_check(voice: Voice, check: "Check") -> None:
     if voice.json:
         from psvideo.runs.steps.checked import check_record
 
-        print(json_text.dumps(check_record(check)), flush=True)
+        print_json(json_text.dumps(check_record(check)))
         return
     looked = f"{check.looked_at} of {check.frames} frames looked at, {check.seconds:.1f} s"
     voice.say(f"{check.path}: {check.verdict} ({looked})")
@@ -139,7 +139,7 @@ def _print_check(voice: Voice, check: "Check") -> None:
 
 def _print_fault(voice: Voice, path: Path, fault: str) -> None:
     if voice.json:
-        print(json_text.dumps({"schema": "psvideo-check/1", "path": str(path), "usable": False, "error": fault}))
+        print_json(json_text.dumps({"schema": "psvideo-check/1", "path": str(path), "usable": False, "error": fault}))
     else:
         voice.say(f"{path}: cannot be checked yet.\n  {_word('bad')} footage   {fault}")
     sys.stdout.flush()

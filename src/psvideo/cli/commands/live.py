@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.cli.console import Voice
+from psvideo.cli.console import Voice, print_json
 from psvideo.cli.options.clip_and_run import FirstLight, Force, PlanPath
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.strobe import Yes
@@ -126,7 +126,7 @@ def live(
     telling.warn(summary.notes)
     voice.say(summary.words)
     if voice.json:
-        print(texts.dumps(summary.record), flush=True)
+        print_json(texts.dumps(summary.record))
 
 
 def _list(voice: Voice) -> None:
@@ -144,7 +144,7 @@ def _list(voice: Voice) -> None:
 def _open(voice: Voice, url: str, *, browser: bool) -> None:
     """Say where the page is, and open it."""
     if voice.json:
-        print(texts.dumps({"url": url}), flush=True)
+        print_json(texts.dumps({"url": url}))
     voice.say(f"{url} (Ctrl-C ends it)")
     if browser:
         webbrowser.open(url)
@@ -172,7 +172,7 @@ class _Telling:
             self.warned.discard(self.waited)
         self.waited = status.waits_for
         if self.voice.json:
-            print(texts.dumps(status.record), flush=True)
+            print_json(texts.dumps(status.record))
         elif not self.voice.quiet and (over or self._is_news(status)):
             print(f"{over}{status.line}", end="" if over else "\n", file=sys.stderr, flush=True)
 
