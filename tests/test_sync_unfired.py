@@ -65,6 +65,25 @@ def test_flashes_that_never_fired_are_named_and_incomplete(skipped: tuple[int, .
     assert timing.dropped_frames == ()
 
 
+@pytest.mark.parametrize("skipped", [47, 49])
+def test_beside_a_dark_slot_a_missing_flash_is_no_repeated_frame_and_no_hole(skipped: int, plan: Plan) -> None:
+    shot = shot_of(plan, lambda flash: flash.index == skipped)
+    timing = timing_of(plan, shot)
+    assert held_against(plan, shot, timing) == [flash.index != skipped for flash in inside(plan, shot)]
+    assert not timing.dropped_frames
+    assert not timing.repeated_frames
+    assert sum("never fired" in note for note in timing.notes) == 1
+
+
+@pytest.mark.parametrize("at", [52, 53])
+def test_beside_a_dark_slot_a_frame_that_stands_in_for_the_next_is_repeated(at: int, plan: Plan) -> None:
+    shot = shot_of(plan, lambda _: False)
+    shot.frames[at] = 1.0005 * shot.frames[at - 1]
+    timing = timing_of(plan, shot)
+    assert timing.repeated_frames == (at,)
+    assert not any("never fired" in note for note in timing.notes)
+
+
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.85])
 def test_a_light_that_dies_is_named_from_when_it_does(share: float, plan: Plan) -> None:
     slot, from_s = plan.lit_slots[1], share * FRAMES * plan.camera.frame_period_s

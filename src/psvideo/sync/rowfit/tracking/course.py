@@ -10,7 +10,8 @@ from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds,
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.ends import ends
-from psvideo.sync.rowfit.tracking.holes import settled, with_repeats
+from psvideo.sync.rowfit.tracking.holes import NEAR, settled, with_repeats
+from psvideo.sync.rowfit.tracking.instead import without_false_repeats
 from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, track
 
 TRACK_ROWS = 60
@@ -68,15 +69,23 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     tracked = from_first_frame(kept, replace(tracked, index=placed.index))
     index = tracked.index
     there = replace(kept, index=index)
-    stray = np.diff(index) - np.diff(numbering.plain)
+    every = without_false_repeats(plan, rows, with_repeats(plan, rows, tracked, numbering.kept))
+    stray = np.diff(every.index[numbering.kept]) - np.diff(numbering.plain)
     return Course(
-        track=with_repeats(plan, rows, tracked, numbering.kept),
-        unsure=index[unsure],
+        track=every,
+        unsure=_beside_steps(rows, every, index[unsure]),
         trusted=(int(index[placed.lost_first]), int(index[len(index) - 1 - placed.lost_last])),
         steps=int((stray != 0).sum()),
         strayed=int(np.abs(stray).sum()),
         share=gain_of(there, unexplained(plan, there, tracked.beat)),
     )
+
+
+def _beside_steps(rows: Profiles, tracked: FrameTrack, places: IntArray) -> IntArray:
+    """Return those places in time that lie near a hole or a repeat, which may have been taken back since."""
+    odd = tracked.index[:-1][np.diff(tracked.index) != np.diff(rows.index)]
+    near: IntArray = places[(np.abs(places[:, None] - odd) <= NEAR).any(axis=1)]
+    return near
 
 
 def window_frames(plan: Plan) -> int:

@@ -1,0 +1,79 @@
+"""A flash that never fired beside a dark slot: a frame in the dark looks like the one before it and is not repeated.
+
+Taken for repeated, it leaves its own place in time empty, or the next frame's: a repeat and a hole that cancel within a
+few frames. Where one missing flash explains these frames as well at the places that numbering gives them, it is that.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit import row_model
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, compiled_rows
+from psvideo.sync.rowfit.row_model import IntArray
+from psvideo.sync.rowfit.tracking.holes import MEMORY, NATURAL
+from psvideo.sync.rowfit.tracking.losses import frame_losses
+from psvideo.sync.rowfit.tracking.track import FrameTrack
+
+LONGEST = 4
+"""Frames at most between a hole and the repeat that cancels it."""
+BESIDE = 2
+"""Frames on either side that may see some of the same flash."""
+
+
+def without_false_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack) -> FrameTrack:
+    """Return the track with frames that were taken for repeated at their own places where a flash that never fired
+    explains them as well."""
+    index = tracked.index
+    for stretch in _cancelled(index, rows.index):
+        own = rows.index[stretch] - rows.index[stretch.start - 1] + index[stretch.start - 1]
+        moved = index.copy()
+        moved[stretch] = own
+        if _as_well(plan, rows, tracked.beat, index, moved, stretch):
+            index = moved
+    return replace(tracked, index=index)
+
+
+def _cancelled(index: IntArray, numbered: IntArray) -> Iterator[slice]:
+    """Yield the stretches of frames that are displaced between a hole and a repeat that cancel one another."""
+    more = index - numbered
+    displaced = np.flatnonzero(np.diff(more))
+    for before, after in zip(displaced[:-1].tolist(), displaced[1:].tolist(), strict=True):
+        repeated = (np.diff(index[[before, before + 1]]) == 0)[0] or (np.diff(index[[after, after + 1]]) == 0)[0]
+        if repeated and after - before <= LONGEST and more[before] == more[after + 1]:
+            yield slice(before + 1, after + 1)
+
+
+def _as_well(plan: Plan, rows: Profiles, beat: Beat, index: IntArray, moved: IntArray, stretch: slice) -> bool:
+    """Return whether frames fit as well at the places ``moved`` once one of the flashes that they see is left out."""
+    near = slice(max(stretch.start - MEMORY, 0), stretch.stop + MEMORY)
+    asked = slice(max(stretch.start - BESIDE, near.start), stretch.stop + BESIDE)
+    at = slice(asked.start - near.start, asked.stop - near.start)
+    found, other = (replace(rows.one_window(), index=places).take(near) for places in (index, moved))
+    trust = np.ones_like(found.value)
+    trust[at] = 1e-6
+    light = brightnesses(plan, found, beat, trust)
+    flashes = compiled_flashes(plan, found, beat)
+    left = _left(found, beat, flashes, light)[at].sum()
+    lit = np.flatnonzero(flashes.unknown)
+    first_s, last_s = other.frame_start_s[at][[0, -1]]
+    seen = lit[(flashes.start_s[lit] > first_s - rows.period_s) & (flashes.start_s[lit] < last_s + 2 * rows.period_s)]
+    least = min((_left(other, beat, _dark(flashes, one), light)[at].sum() for one in seen.tolist()), default=np.inf)
+    return bool(least < left + NATURAL)
+
+
+def _dark(flashes: row_model.Flashes, one: int) -> row_model.Flashes:
+    unknown = flashes.unknown.copy()
+    unknown[one] = 0
+    return flashes._replace(unknown=unknown)
+
+
+def _left(rows: Profiles, beat: Beat, flashes: row_model.Flashes, light: FloatArray) -> FloatArray:
+    """Return how badly known brightnesses foretell frames under some flashes, shape (frame,)."""
+    found = np.empty_like(rows.value)
+    row_model.predictions(compiled_rows(rows, beat), flashes, light, 0, rows.value.shape[1], found)
+    return frame_losses(rows, rows.value - found)
