@@ -26,18 +26,16 @@ def as_h264(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
     return read_back(folder / "clip.mp4", plan)
 
 
-def write_h264(
-    path: Path, plan: Plan, frames: np.ndarray, *, crf: int = QUALITY, preset: str = "medium", threads: int = 1
-) -> None:
+def write_h264(path: Path, plan: Plan, frames: np.ndarray, *, crf: int = QUALITY, preset: str = "medium") -> None:
     """Write grey frames (frame, row, col) in linear light as 8-bit sRGB, 4:2:0, BT.709, video range.
 
-    With one thread the same frames give the same bytes; with a number that x264 chooses they do not. Its assembly code
-    decides on frames by memory that nobody set, and is left out.
+    By one thread the same frames give the same bytes; by more they do not under load. x264's assembly code decides on
+    frames by memory that nobody set, and is left out.
     """
     signal = CURVES["srgb"].encode(np.clip(frames, 0, 1))
     luma = np.round(16 + 219 * signal).astype(np.uint8)
     rows, cols = luma.shape[1:]
-    options = {"crf": str(crf), "preset": preset, "threads": str(threads), "x264-params": "asm=0"}
+    options = {"crf": str(crf), "preset": preset, "threads": "1", "x264-params": "asm=0"}
     with av.open(str(path), "w") as container:
         stream: Any = container.add_stream("libx264", rate=plan.camera.fps, options=options)
         stream.width, stream.height, stream.pix_fmt = cols, rows, "yuv420p"

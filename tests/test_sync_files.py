@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.compression import TRIALS, outcomes, trial_of, tried
+from bench.compression import TRIALS, Trial, outcomes, trial_of, tried
 from bench.timing_files import write_h264
 
 from psvideo.formats.plan_toml import format_plan
@@ -76,6 +76,20 @@ def test_compression_is_not_taken_for_slow_leds(
 def test_blurred_edges_are_taken_for_no_other_time(seed: int) -> None:
     outcome = tried(trial_of(seed))
     assert outcome.owned, outcome
+
+
+@pytest.mark.parametrize(("seed", "crf", "shutter"), [(5067, 14, 0.75), (5075, 17, 0.25), (5088, 11, 0.75)])
+def test_edges_that_a_blur_softens_a_little_put_the_times_in_doubt(seed: int, crf: int, shutter: float) -> None:
+    offset_ppm = 30.0 if seed == 5075 else 2000.0
+    outcome = tried(Trial(seed=seed, crf=crf, preset="veryfast", shutter=shutter, offset_ppm=offset_ppm))
+    assert 0.4 * outcome.claimed_rows < outcome.made_rows < 2 * outcome.claimed_rows
+
+
+def test_tails_that_compression_could_feign_are_in_doubt_where_they_are_taken() -> None:
+    trial = Trial(seed=6006, crf=19, preset="ultrafast", shutter=0.5, offset_ppm=-5000.0, tails_rows=0.6)
+    outcome = tried(trial)
+    assert outcome.made_rows < 0.15
+    assert 0.2 < outcome.claimed_rows < 0.6
 
 
 @pytest.mark.campaign

@@ -10,7 +10,7 @@ from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit, clearest, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, cleared, within_blur
+from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, FEIGNED, blurred_s, cleared, within_blur
 
 CLEAR = 5.0
 """A time leaves the plan's value only when it is off by this many standard errors."""
@@ -83,7 +83,9 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
         fit, free = tried, tuple(dict.fromkeys((*free, *tried.errors_s)))
     only_shutter = len(free) > len(known) and not set(TAILS) & set(free)
     if only_shutter and within_blur(rows, first.beat, fit.beat) and cleared(plan, rows, first, fit) < BELIEVED:
-        return Freed(fit=first, unsure_s=BLURRED * soft_s, soft_s=soft_s)
+        return Freed(fit=first, unsure_s=BLURRED * (soft_s or blurred_s(plan, rows, first)), soft_s=soft_s)
+    if not (soft_s or set(TAILS) & set(free)):
+        unsure_s = float(np.hypot(unsure_s, BLURRED * blurred_s(plan, rows, fit)))
     errors_s = {name: float(np.hypot(error_s, wider_s.get(name, 0.0))) for name, error_s in fit.errors_s.items()}
     return Freed(fit=replace(fit, errors_s=errors_s) if wider_s else fit, unsure_s=unsure_s, soft_s=soft_s)
 
@@ -98,7 +100,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     """Free the tails, if they explain what a blur of the rows does not; else the fit as it is, with what is in doubt.
 
     A tail moves the start of its flash by as much as it is long, a blur does not: where both would do, a wrong tail is
-    worse.
+    worse. Tails that explain no more of what edges leave than compression feigns are in doubt even where they fit best.
     """
     slow = fitted(plan, rows, fit.beat, (*free, *tails))
     gain = taken_away(plan, rows, fit, slow)
@@ -117,7 +119,10 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     likelier = gain > by_blur and beyond > max(SLOWER, SLOWER_SHARE * _loss(rows, fit))
     taken = both if taken_away(plan, rows, slow, both) > WORTH else slow
     if likelier and _longer(taken, joint) and _clear(fit, both, tails):
-        return Freed(fit=taken, unsure_s=float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both))))
+        apart_s = float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both)))
+        if cleared(plan, rows, fit, taken) < FEIGNED:
+            apart_s = float(np.hypot(apart_s, UNTOLD * rms_apart_s(rows, fit.beat, taken.beat)))
+        return Freed(fit=taken, unsure_s=apart_s)
     doubt_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, both.beat), both.shift_error_s))
     return Freed(fit=fit, unsure_s=doubt_s, soft_s=max(slow.beat.rise_s, slow.beat.fall_s))
 
