@@ -1,4 +1,4 @@
-"""A flash that never fired, and a light that dies during the clip: named, incomplete, and no plate."""
+"""A flash that never fired, a light that dies during the clip, a black frame: named, incomplete, and no plate."""
 
 from collections.abc import Callable
 
@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.model.plan import Plan
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
 from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
@@ -101,3 +102,23 @@ def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(pl
     timing = timing_of(plan, shot)
     assert all(held_against(plan, shot, timing))
     assert not any("never fired" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(("shutter", "at"), [(1.0, 47), (1.0, 51), (0.5, 46), (0.5, 49)])
+def test_a_black_frame_is_named_and_spoils_what_it_saw_and_no_light(
+    shutter: float, at: int, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(height_px=48, width_px=12, shutter=shutter)
+    shot = shot_of(plan, lambda _: False)
+    shot.frames[at] = 0.0
+    timing = timing_of(plan, shot)
+    first, last = frames_touched(plan.camera, timing.start_s, timing.duration_s)
+    saw = {flash.index for flash, a, b in zip(timing.flashes, first, last, strict=True) if a <= at <= b}
+    period_s = plan.camera.frame_period_s
+    within = [one for one in timing.flashes if 3 * period_s < one.start_s < (FRAMES - 4) * period_s]
+    assert {flash.index for flash in within if not flash.complete} == saw
+    assert len(saw) >= 1
+    assert any(f"Frame {at} is black" in note for note in timing.notes)
+    assert not any("never fired" in note for note in timing.notes)
+    assert not timing.dropped_frames
+    assert not timing.repeated_frames

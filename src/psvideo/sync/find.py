@@ -18,6 +18,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Order, Timing
 from psvideo.model.units import counted
+from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
 from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
 from psvideo.sync.restarted import found_in_parts
@@ -127,12 +128,15 @@ def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
         dropped=_all_dropped(take.dropped, take.numbers, take.indices, found.track.index),
         repeated=tuple(int(number) for number in take.numbers[found.track.repeated]),
     )
-    fired = without_unfired(plan, found, timing.flashes)
+    black = black_frames(plan, found)
+    seen = marked(plan, found, timing.flashes, black)
+    fired = without_unfired(plan, found, seen)
     notes = (
-        *remarks(plan, found, steady=only_fired(found, timing.flashes, fired)),
+        *remarks(plan, found, steady=only_fired(found, seen, fired)),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
         *remarks_on_frames(plan, found, take.indices),
-        *remarks_on_unfired(found, timing.flashes, fired, take.numbers),
+        *remarks_on_black(found, black, take.numbers),
+        *remarks_on_unfired(found, seen, fired, take.numbers),
     )
     return replace(timing, flashes=fired, notes=notes)
 

@@ -1,7 +1,8 @@
-"""A flash that never fired beside a dark slot: a frame in the dark looks like the one before it and is not repeated.
+"""A flash that never fired, or a black frame, beside a dark slot: what is dark looks repeated, and is not.
 
 Taken for repeated, it leaves its own place in time empty, or the next frame's: a repeat and a hole that cancel within a
-few frames. Where one missing flash explains these frames as well at the places that numbering gives them, it is that.
+few frames. Where one missing flash, or one black frame, explains these frames as well at the places that numbering
+gives them, it is that.
 """
 
 from collections.abc import Iterator
@@ -26,8 +27,8 @@ BESIDE = 2
 
 
 def without_false_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack) -> FrameTrack:
-    """Return the track with frames that were taken for repeated at their own places where a flash that never fired
-    explains them as well."""
+    """Return the track with frames that were taken for repeated at their own places where a flash that never fired,
+    or a black frame, explains them as well."""
     index = tracked.index
     for stretch in _cancelled(index, rows.index):
         own = rows.index[stretch] - rows.index[stretch.start - 1] + index[stretch.start - 1]
@@ -49,21 +50,22 @@ def _cancelled(index: IntArray, numbered: IntArray) -> Iterator[slice]:
 
 
 def _as_well(plan: Plan, rows: Profiles, beat: Beat, index: IntArray, moved: IntArray, stretch: slice) -> bool:
-    """Return whether frames fit as well at the places ``moved`` once one of the flashes that they see is left out."""
-    near = slice(max(stretch.start - MEMORY, 0), stretch.stop + MEMORY)
-    asked = slice(max(stretch.start - BESIDE, near.start), stretch.stop + BESIDE)
+    """Return whether frames fit as well at the places ``moved`` once a flash that they see, or a frame, is left out."""
+    near = slice(max(stretch.start - MEMORY, 0), min(stretch.stop + MEMORY, len(index)))
+    asked = slice(max(stretch.start - BESIDE, near.start), min(stretch.stop + BESIDE, near.stop))
     at = slice(asked.start - near.start, asked.stop - near.start)
     found, other = (replace(rows.one_window(), index=places).take(near) for places in (index, moved))
     trust = np.ones_like(found.value)
     trust[at] = 1e-6
     light = brightnesses(plan, found, beat, trust)
     flashes = compiled_flashes(plan, found, beat)
-    left = _left(found, beat, flashes, light)[at].sum()
+    left = _left(found, _shown(found, beat, flashes, light))[at].sum()
     lit = np.flatnonzero(flashes.unknown)
     first_s, last_s = other.frame_start_s[at][[0, -1]]
     seen = lit[(flashes.start_s[lit] > first_s - rows.period_s) & (flashes.start_s[lit] < last_s + 2 * rows.period_s)]
-    least = min((_left(other, beat, _dark(flashes, one), light)[at].sum() for one in seen.tolist()), default=np.inf)
-    return bool(least < left + NATURAL)
+    tried = [_shown(other, beat, _dark(flashes, one), light) for one in seen.tolist()]
+    tried += [_black(_shown(other, beat, flashes, light), n) for n in range(at.start, at.stop)]
+    return bool(min(_left(other, shown)[at].sum() for shown in tried) < left + NATURAL)
 
 
 def _dark(flashes: row_model.Flashes, one: int) -> row_model.Flashes:
@@ -72,8 +74,19 @@ def _dark(flashes: row_model.Flashes, one: int) -> row_model.Flashes:
     return flashes._replace(unknown=unknown)
 
 
-def _left(rows: Profiles, beat: Beat, flashes: row_model.Flashes, light: FloatArray) -> FloatArray:
-    """Return how badly known brightnesses foretell frames under some flashes, shape (frame,)."""
+def _black(shown: FloatArray, frame: int) -> FloatArray:
+    black = shown.copy()
+    black[frame] = 0.0
+    return black
+
+
+def _shown(rows: Profiles, beat: Beat, flashes: row_model.Flashes, light: FloatArray) -> FloatArray:
+    """Return what known brightnesses foretell under some flashes, shape (frame, row)."""
     found = np.empty_like(rows.value)
     row_model.predictions(compiled_rows(rows, beat), flashes, light, 0, rows.value.shape[1], found)
-    return frame_losses(rows, rows.value - found)
+    return found
+
+
+def _left(rows: Profiles, shown: FloatArray) -> FloatArray:
+    """Return how badly frames fit what was foretold, shape (frame,)."""
+    return frame_losses(rows, rows.value - shown)
