@@ -60,6 +60,12 @@ def test_rows_that_show_nothing_put_no_times_in_doubt() -> None:
     assert not any("come early or late" in note for note in timing.notes)
 
 
+def test_stripes_that_move_with_the_dark_row_are_no_clock_that_jumps() -> None:
+    timing, off_rows = timed(groups()["Scenes"]["stripes moving with the dark row"], seed=0)
+    assert off_rows < timing.phase_error_rows < 0.02
+    assert not any("come early or late" in note for note in timing.notes)
+
+
 @pytest.mark.parametrize("share", [0.3, pytest.param(0.5, marks=pytest.mark.campaign)])
 def test_stripes_that_keep_pace_with_the_dark_row_are_timed(share: float) -> None:
     plan = plan_of(lights=tuple("abcde"), durations_s=(0.0016,), height_px=160, readout=0.9)

@@ -44,6 +44,8 @@ def unsteady_s(plan: Plan, rows: Profiles, fit: Fit, stray: Jitter) -> float:
     pull, stiff = np.add.reduceat(pull, first), np.add.reduceat(stiff, first)
     opening_s, closing_s = (pull / stiff - pull.sum(axis=0) / stiff.sum(axis=0)).T
     late_s, half_s = 0.5 * (opening_s + closing_s), 0.5 * np.abs(opening_s - closing_s)
+    scatter_s = NORMAL * float(np.median(np.abs(np.diff(late_s)))) / np.sqrt(2)
     least_s = np.maximum(SURE * 0.5 * np.sqrt(noise * (1 / stiff).sum(axis=1)), LEAST * plan.shortest_flash_s)
+    least_s = np.maximum(least_s, SURE * scatter_s)
     off_s = np.where((np.abs(late_s) > least_s) & (np.abs(late_s) > ALIKE * half_s), late_s, 0.0)
     return float(np.sqrt(np.mean(off_s**2)))
