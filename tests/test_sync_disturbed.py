@@ -480,6 +480,9 @@ def test_bends_add_up_and_run_straight_on_beyond_the_last_knot() -> None:
     np.testing.assert_allclose(clock.bend(np.array([-1.0, 0.5, 3.0])), [-1e-6, 0.5e-6, 5e-6])
     twice = clock.bent(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1e-6, 3e-6]))
     np.testing.assert_allclose(twice.bend(np.array([0.5])), [1e-6])
+    moved = clock.shifted(2e-6, 10.0, pivot_s=1.0)
+    np.testing.assert_allclose([moved.phase_s, moved.offset_ppm], [2e-6 - 10e-6, 10.0])
+    assert (moved.knot_s, moved.bend_s) == (clock.knot_s, clock.bend_s), "bends stay with the clock"
 
 
 def test_plates_of_a_clip_with_frames_missing_unseen_are_those_of_the_whole_clip(plan: Plan, tmp_path: Path) -> None:
