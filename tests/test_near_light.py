@@ -29,7 +29,8 @@ from psvideo.solve.normals.loops.near_kernel import place_lights
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Floats, Near
 from psvideo.solve.normals.trust.near_spread import near_spread
-from psvideo.solve.sweeping import swept
+from psvideo.solve.sweeping import RATIOS, swept
+from psvideo.solve.sweeping import _unsure as doubted
 
 Array = NDArray[np.float64]
 SIZE, WIDTH_M, FAR_M = 96, 0.4, 1.6
@@ -228,6 +229,24 @@ def test_what_is_far_and_dim_is_in_doubt_and_never_a_confident_wrong_answer(nois
     assert found.error_deg is not None
     assert np.mean(apart[wall] < found.error_deg[wall]) > 0.68
     assert np.mean(apart[found.valid] > 10) < 0.03
+
+
+def test_a_distance_may_be_off_by_how_far_others_lie_that_explain_the_light_too() -> None:
+    logs, shape = np.log(RATIOS)[:, None, None], (6, 8)
+    wall = np.broadcast_to(np.arange(shape[1]) < shape[1] // 2, shape)
+    far, reached = float(np.log(2.2)), np.ones(shape, np.bool_)
+    found, nothing_told = np.where(wall, far, 0.0), np.zeros((len(RATIOS), *shape))
+    either = doubted(nothing_told, 5, found, reached)
+    np.testing.assert_allclose(either, np.sqrt(0.5) * far, rtol=0.25)  # half of the picture is where this is not
+    assert doubted(nothing_told, 5, np.zeros(shape), reached).max() < 0.4 * either.min()
+    told = (
+        16 * (logs - far) ** 2 * np.ones(shape)
+    )  # by a standard error of a twentieth, were five points of five lights
+    doubt = doubted(told, 5, found, reached)
+    np.testing.assert_allclose(doubt[wall], 0.05, rtol=0.3)
+    np.testing.assert_allclose(
+        doubt[~wall], far, rtol=0.05, err_msg="what was taken is wrong, however sure the light is"
+    )
 
 
 def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:

@@ -37,8 +37,8 @@ LEAST_GAIN = 0.005
 PLANE_HOLDS, LEAST_POINTS = 0.06, 25
 """A part of at least this many points is on the plane where it is found no farther from it than this share: the plane
 was measured, and normals say more of the relief than distances do."""
-ON_PLANE, RELIEF = 0.8, 0.1
-"""The prior on distances: this share of the picture lies within about this share of the plane's distance, the rest
+FOUND, RELIEF = 0.8, 0.1
+"""The prior on distances: this share of the picture lies within about this share of distances that were found, the rest
 anywhere."""
 SURE = 0.01
 """Better than to this share no distance is known."""
@@ -76,8 +76,8 @@ def swept(
 
 @dataclass(frozen=True, kw_only=True)
 class Distances:
-    """What the sweep found at points (row, col): ``depth_m``, ``unsure``, the standard deviation of its logarithm, and
-    whether all of the surface stands on the plane."""
+    """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, and whether
+    all of the surface stands on the plane."""
 
     depth_m: NDArray[np.float32]
     unsure: NDArray[np.float32]
@@ -96,20 +96,26 @@ def _distances(
     found = np.where(reached, plane_m * np.exp(_best(costs)), 0).astype(np.float32)
     deep = np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
     on_plane = _on_plane(deep / plane_m, reached, _jumps(deep))
-    return Distances(depth_m=deep, unsure=_unsure(costs, len(lights)), on_plane=on_plane)
+    unsure = _unsure(costs, len(lights), np.log(deep / plane_m), reached)
+    return Distances(depth_m=deep, unsure=unsure, on_plane=on_plane)
 
 
-def _unsure(costs: NDArray[np.float64], lights: int) -> NDArray[np.float32]:
-    """Return the standard deviation of the logarithm of the distance, from how much worse others explain the light.
+def _unsure(
+    costs: NDArray[np.float64], lights: int, taken: NDArray[np.float64], reached: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return how far off the distance may be that was ``taken``, (row, col), logarithms both: the root mean square of
+    how far others lie from it, by how much worse they explain the light.
 
-    Before the light is looked at, most things are near the plane that somebody measured, and some are anywhere.
+    Before its own light is looked at, a point stands where most of those that are ``reached`` were found, or anywhere:
+    a wall behind the subject may be as far as any part of it. What distances leave of the light is the surface's own,
+    and alike in neighbours: a square of points is one measurement per light and point of its width.
     """
     logs = np.log(RATIOS)[:, None, None]
-    before = ON_PLANE * np.exp(-0.5 * (logs / RELIEF) ** 2) + (1 - ON_PLANE) * RELIEF
-    likely = before * np.exp(-0.5 * lights * AROUND**2 * (costs - costs.min(axis=0)))
+    near = np.exp(-0.5 * ((taken[reached] - logs[:, 0]) / RELIEF) ** 2).mean(axis=1)
+    before = FOUND * near[:, None, None] + (1 - FOUND) * RELIEF
+    likely = before * np.exp(-0.5 * lights * AROUND * (costs - costs.min(axis=0)))
     likely /= likely.sum(axis=0)
-    mean = (likely * logs).sum(axis=0)
-    return np.asarray(np.sqrt((likely * (logs - mean) ** 2).sum(axis=0) + SURE**2), np.float32)
+    return np.asarray(np.sqrt((likely * (logs - taken) ** 2).sum(axis=0) + SURE**2), np.float32)
 
 
 def _jumps(depth_m: NDArray[np.float32]) -> NDArray[np.bool_]:
