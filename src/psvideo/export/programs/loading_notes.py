@@ -50,14 +50,18 @@ def _facts(made: Delivered) -> list[str]:
     facts = [
         f"Numbers {made.first} to {made.last} ({count}), {rate} frames a second.",
         f"Normals are in {frame}{flipped}.",
-        "EXR: signed unit vectors, -1 to 1, and 0 where not valid. They are data: no colour space, no curve.",
+        "EXR: signed unit vectors, -1 to 1, and 0 where there is none. They are data: no colour space, no curve.",
     ]
     if made.delivery.png16:
         facts.append("PNG, 16 bits: 0.5 + 0.5 n, data as well. Its tags say linear, but many programs assume sRGB.")
     if made.delivery.needs_depth:
         unit = "the unit of the camera's file" if space.name == "world" else "metres"
         facts.append(f"Positions are in the frame of the normals, in {unit if made.metric else 'a relative unit'}.")
-    return [*facts, "valid/ is 1 where a normal is to be trusted: multiply by it, and never filter across its edge."]
+    return [
+        *facts,
+        "valid/ is 1 where a normal was measured and is to be trusted; where it is 0, a normal is a best estimate at "
+        "most. Multiply by it where only measured ones may count, and never filter across its edge.",
+    ]
 
 
 def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
@@ -69,6 +73,15 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
         if world
         else "a Camera at the origin without rotation (camera space is its own), with the shot's focal length"
     )
+    relight = [
+        "ReLight: this into color, normal vectors = normals, point positions = position, use alpha on; "
+        f"cam = {camera}; lights = a Scene with your lights, in the same frame and unit.",
+        "ReLight needs a material: a Diffuse node (white) on its material input gives albedo * n.l.",
+    ]
+    without = (
+        "ReLight needs point positions in metres, which this rig does not give (lens and plane): use the script's "
+        "groups."
+    )
     return (
         [
             f"Open {made.clip}.nk, which lies beside this note: the sequences read as they must be, a relighting group "
@@ -78,12 +91,7 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
             f"The parts of the file are layers of these names: {', '.join(made.delivery.bundle)}. x, y, z are in red, "
             "green, blue; beauty is the sum of all lights, with alpha.",
             "Shuffle albedo into rgba, valid into alpha.",
-            "ReLight: this into color, normal vectors = normals, point positions = position, use alpha on; "
-            f"cam = {camera}; lights = a Scene with your lights, in the same frame and unit."
-            if made.delivery.needs_depth
-            else "ReLight needs point positions in metres, which this rig does not give (lens and plane): use the "
-            "script's groups.",
-            "ReLight needs a material: a Diffuse node (white) on its material input gives albedo * n.l.",
+            *(relight if made.delivery.needs_depth else [without]),
         ],
         [
             "Without Raw Data a colour space may be applied to vectors: the light comes from wrong directions.",
@@ -145,6 +153,7 @@ def _unreal(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     )
 
 
+UNSIZED = ("One Houdini unit is a metre: relative positions (see above) have no size.",)
 POINTS = (
     "Points: read position and normals into P and N of a grid of points by pixel, and delete points where valid is 0.",
 )
@@ -166,6 +175,6 @@ def _houdini(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
         [
             "A colour space conversion on reading: set Raw.",
             "A Normal Map shader with signed values: it expects 0 to 1.",
-            "One Houdini unit is a metre: relative positions (see above) have no size.",
+            *(UNSIZED if made.delivery.needs_depth and not made.metric else ()),
         ],
     )
