@@ -6,6 +6,7 @@ The command alone, one of its workers or their keepers, or all of them at once. 
 """
 
 import argparse
+import contextlib
 import os
 import signal
 import subprocess
@@ -76,7 +77,7 @@ def _killed(
     time.sleep(moment_s)
     processes = _alive([psutil.Process(running.pid)])
     family = processes + [one for parent in processes for one in parent.children(recursive=True)]
-    _kill(running, family[1:], whom, rng)
+    _kill(running, [one for one in family[1:] if _works(one)], whom, rng)
     wrong = []
     try:
         _, said = running.communicate(timeout=ENDS_S)
@@ -108,6 +109,13 @@ def _kill(running: subprocess.Popen[str], children: list[psutil.Process], whom: 
         running.kill()
     elif children:
         children[int(rng.integers(len(children)))].kill()
+
+
+def _works(process: psutil.Process) -> bool:
+    """Return whether a process is a worker, and not one that Python keeps beside them to tidy up."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return any("spawn_main" in word for word in process.cmdline())
+    return False
 
 
 def _alive(processes: list[psutil.Process]) -> list[psutil.Process]:

@@ -274,7 +274,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import psvideo as ps
-from psvideo.runs.steps.compiling import GLOSS, SmallTake
+from psvideo.runs.steps.compiling import GLOSS, SmallTake, filmed
 folder = Path(sys.argv[1])
 logging.getLogger("psvideo.compiling").setLevel(logging.INFO)
 logging.getLogger("psvideo.compiling").addHandler(logging.StreamHandler(sys.stdout))
@@ -288,13 +288,14 @@ takes = (
     (SmallTake(lights=5, kind="exr"), {"fill": False}),
     (SmallTake(lights=8), {"solver": "least-squares", "aov": ("residual", "error")}),
     (SmallTake(lights=3), {"solver": "robust"}),
+    (SmallTake(lights=4, near=True), {}),
+    (SmallTake(lights=8, near=True), {"aov": ("depth",)}),
     (SmallTake(lights=6, kind="png8", camera='bits = 8, transfer = "srgb"', motion=moving), {}),
     (SmallTake(lights=8, kind="dng", camera='cfa = "RGGB"', motion=moving), {"aov": ("depth",)}),
 )
 for number, (take, how) in enumerate(takes):
-    clip = folder / f"clip{number}"
-    (folder / "scene.toml").write_text(take.scene)
-    ps.shoot(folder / "scene.toml", clip)
+    (folder / str(number)).mkdir()
+    clip = filmed(take, folder / str(number))
     ps.normals(clip, rig=clip / "rig.toml", out=folder / f"out{number}", **how)
 for lights in (3, 4, 5, 9, 12):
     around = np.arange(lights) * 2 * np.pi / lights

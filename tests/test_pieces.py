@@ -377,6 +377,8 @@ def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path
     assert digest(tmp_path / "all" / "clip") == digest(tmp_path / "one" / "clip")
     assert judged(tmp_path / "all" / "clip") == judged(tmp_path / "one" / "clip")
     assert "dark: failed." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+    again = ps.normals_of_takes([clip], out=tmp_path / "all" / "clip", workers=2, pieces=2, resume=True, **given)
+    assert [one.fault for one in again] == [""], "what is done is no fault"
 
 
 @pytest.mark.parametrize("how", [[], pytest.param(["--workers", "2"], marks=pytest.mark.campaign)])

@@ -1,12 +1,13 @@
 """Several takes in one go, or one by several processes: ``psvideo normals takes/* -o results/``."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import UsageError
+from psvideo.errors import AllDoneError, UsageError
 from psvideo.formats.paths import path_if_given
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.many_takes.cluster import Cluster
@@ -96,8 +97,9 @@ class TakeInPieces:
     options: Mapping[str, Any]
 
     def do(self, number: int) -> None:
-        """Find the take's timing and what is global (number 0), or solve one piece."""
-        normals(self.clip, out=self.out, piece=f"{number}/{self.pieces}", **self.options)
+        """Find the take's timing and what is global (number 0), or solve one piece. What is done already stays."""
+        with suppress(AllDoneError):
+            normals(self.clip, out=self.out, piece=f"{number}/{self.pieces}", **self.options)
 
 
 def _counts(takes: Takes, workers: int, options: Mapping[str, Any]) -> Iterator[int]:

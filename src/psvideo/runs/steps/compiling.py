@@ -30,10 +30,11 @@ GLOSS = ", specular = { strength = 0.3, roughness = 0.35 }"
 
 @dataclass(frozen=True, kw_only=True)
 class SmallTake:
-    """A take that makes loops compile: its number of lights, its files and camera, what is asked of it, and whether it
-    is watched live too."""
+    """A take that makes loops compile: its number of lights, whether its rig says that they stand ``near``, its files
+    and camera, what is asked of it, and whether it is watched live too."""
 
     lights: int
+    near: bool = False
     kind: str = "png16"
     camera: str = "full_well_e = 30000"
     motion: str = ""
@@ -65,8 +66,10 @@ USUAL = (
     SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
     SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"', live=True),
     SmallTake(lights=3, kind="exr", float32=True),
+    SmallTake(lights=3, near=True),
 )
-"""What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many; at rest and moving."""
+"""What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many, far and near; at rest and
+moving."""
 
 
 PICTURES = (
@@ -98,17 +101,27 @@ def compile_ahead(*, watch: Watch = unwatched) -> None:
             one.result()
 
 
+def filmed(take: SmallTake, folder: Path) -> Path:
+    """Film a small take into a folder, and return the clip, its rig beside it."""
+    from psvideo.formats.light_lists.light_list_writer import write_rig
+    from psvideo.synth.shoot import shoot
+
+    scene, clip = folder / "small.toml", folder / "clip"
+    scene.write_text(take.scene, encoding="utf-8")
+    shoot(scene, clip)
+    if take.near:
+        write_rig(clip / "rig.toml", SmallPictures(lights=take.lights, near=True).rig)
+    return clip
+
+
 def run_small(take: SmallTake) -> None:
     """Film a small take and run the whole of ``normals`` on it, timing and all, in a folder that is gone afterwards."""
     from psvideo.runs.live import live
     from psvideo.runs.normals import normals
-    from psvideo.synth.shoot import shoot
 
     quiet = Caller(say=_unsaid, warn=_unsaid, detail=_unsaid)
     with tempfile.TemporaryDirectory(prefix="psvideo-compiling-") as folder:
-        scene, clip = Path(folder) / "small.toml", Path(folder) / "clip"
-        scene.write_text(take.scene, encoding="utf-8")
-        shoot(scene, clip)
+        clip = filmed(take, Path(folder))
         normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
         if take.live:
             live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
