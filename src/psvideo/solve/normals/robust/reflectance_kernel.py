@@ -98,6 +98,17 @@ def fill_parts(measured: Values, towards: Values, half: Values, g: Values, typic
 
 
 @FUSED.inlined
+def _add_square(m: Values, weight: float, x: float, y: float, z: float) -> None:
+    """Add a vector's square, so often, to a matrix (its upper triangle row by row)."""
+    m[0] += weight * x * x
+    m[1] += weight * x * y
+    m[2] += weight * x * z
+    m[3] += weight * y * y
+    m[4] += weight * y * z
+    m[5] += weight * z * z
+
+
+@FUSED.inlined
 def _solve_symmetric(m: Values, x: Values) -> None:
     """Solve with a positive definite matrix (its upper triangle row by row); the answer stands in ``x``."""
     b, c = m[1] / m[0], m[2] / m[0]
@@ -120,13 +131,7 @@ def take_off_own(towards: Values, weights: Values, parts: Values, left: Values) 
         matrix[0] = matrix[3] = matrix[5] = 1e-9
         for light in range(len(towards)):
             x, y, z = towards[light, p, 0], towards[light, p, 1], towards[light, p, 2]
-            weight = weights[light, p]
-            matrix[0] += weight * x * x
-            matrix[1] += weight * x * y
-            matrix[2] += weight * x * z
-            matrix[3] += weight * y * y
-            matrix[4] += weight * y * z
-            matrix[5] += weight * z * z
+            _add_square(matrix, weights[light, p], x, y, z)
         for k in range(len(parts)):
             own[:] = 0.0
             for light in range(len(towards)):
@@ -207,13 +212,7 @@ def solve_again(
         matrix[:], right[:] = 0.0, 0.0
         for light in range(lights):
             weight = counts[light, p] / (1 + (rest[light] / (width * spread)) ** 2)
-            x, y, z = rows[light, 0], rows[light, 1], rows[light, 2]
-            matrix[0] += weight * x * x
-            matrix[1] += weight * x * y
-            matrix[2] += weight * x * z
-            matrix[3] += weight * y * y
-            matrix[4] += weight * y * z
-            matrix[5] += weight * z * z
+            _add_square(matrix, weight, rows[light, 0], rows[light, 1], rows[light, 2])
             for i in range(3):
                 right[i] += weight * matte[light] * rows[light, i]
         more = 1e-6 * (matrix[0] + matrix[3] + matrix[5]) + 1e-12
