@@ -44,7 +44,9 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
     clipped = list(_clipping(levels))
     top = max(one.stops(TARGET_QUANTILE) for one in levels.values())
     worst = max(one.clipped_share for one in levels.values())
-    under = "saturation" if not unused_stops else "the largest code, which this curve puts above what sensors show"
+    under = (
+        "saturation" if not unused_stops else "the largest code, which this curve puts above what any sensor records"
+    )
     if top < DIM_STOPS - unused_stops:
         yield Judgement(
             subject="exposure",
