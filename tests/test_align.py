@@ -18,7 +18,8 @@ from psvideo.plates.align.doubt.unsure import UNKNOWN
 from psvideo.plates.align.opened import with_open_shutter
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.align.velocity import flow, moving
+from psvideo.plates.align.velocity import all_lights, flow
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST, BOTH
 from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of, mix_of
@@ -453,7 +454,7 @@ def changed(clip: Filmed, change: Callable[[LightPlate], LightPlate], index: int
 def test_velocities_of_large_pictures_on_a_coarser_grid_follow_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     clip = noiseless(3, "4 px")
     before, fine = clip.rounds[1], brought_as_filmed(3, "4 px")[1]
-    monkeypatch.setattr(moving, "FINE_PIXELS", 1000)
+    monkeypatch.setattr(all_lights, "FINE_PIXELS", 1000)
     coarse = brought(clip)[1]
     assert any(
         one.image.tobytes() != other.image.tobytes() for one, other in zip(coarse.plates, fine.plates, strict=True)
@@ -648,7 +649,7 @@ def test_what_moves_over_many_rows_is_whole_and_what_rests_beside_it_stays(step:
     moves = np.zeros((rows // step, cols // step), np.bool_)
     moves[:, moving_cols.start // step : -(-moving_cols.stop // step)] = True
     velocity = np.stack([np.zeros(moves.shape), px / step * moves]).astype(np.float32)
-    motion = moving.Followed(time_s=0.5, velocity=velocity, moves=moves, rests=~moves, step=step)
+    motion = Followed(time_s=0.5, velocity=velocity, moves=moves, rests=~moves, step=step)
     source = np.where(moves, np.uint8(BOTH), np.uint8(AT_REST))
     ends = between.Ends(before=None if gone else before, after=after, share=0.5)
     plate = between.plate_at(ends, source, motion, number=0)

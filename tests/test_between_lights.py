@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from psvideo.plates.align.velocity import moving
+from psvideo.plates.align.velocity import all_lights
 from psvideo.plates.align.velocity.between_lights import BetweenLights
 from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.flow import Sketch
-from psvideo.plates.align.velocity.moving import Pair, followed_at
+from psvideo.plates.align.velocity.followed import Pair
+from psvideo.plates.align.velocity.moving import followed_at
 
 SHAPE, LIGHTS, SQUARE_PX, ROUND_S = (120, 160), 4, 16.0, 1.0
 FLASHES_S = ROUND_S / (LIGHTS + 1) * (np.arange(LIGHTS) - (LIGHTS - 1) / 2)
@@ -96,7 +97,7 @@ def test_what_leaves_the_picture_is_not_looked_for_far_away(
         asked.append(given)
         return displacements(*given)
 
-    monkeypatch.setattr(moving, "displacements", asking)
+    monkeypatch.setattr(all_lights, "displacements", asking)
     found = followed_at(shown, 0.0)
     assert bool(asked) == far
     assert np.abs(found.velocity[0][24:-24, 64:-64] + px / ROUND_S).mean() < 1.5

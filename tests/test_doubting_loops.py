@@ -11,9 +11,14 @@ from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Usable
-from psvideo.solve.normals.trust import doubting as d
-from psvideo.solve.normals.trust.doubting import Doubting, Signs, ThinSurface, doubt_deg, signs_of
+from psvideo.solve.normals.trust import signs as of_signs
+from psvideo.solve.normals.trust import surroundings as of_around
+from psvideo.solve.normals.trust import thin_surface as thin
+from psvideo.solve.normals.trust import torn as of_torn
+from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.fewer_lights import widened
+from psvideo.solve.normals.trust.signs import Signs, signs_of
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
 SHAPE = (67, 90)
 
@@ -61,30 +66,30 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
     sums, counts = (plane.astype(float) for plane in one.indirect)
     known, lights, plain = points.known, len(one.plates), points.surface.error_deg is None
     albedo, noise_deg = (plane.astype(float) for plane in (points.brightness * known, points.noise_deg))
-    fit = np.minimum(points.fit_deg, d.MOST_FIT_DEG).astype(float)
+    fit = np.minimum(points.fit_deg, of_signs.MOST_FIT_DEG).astype(float)
     strengths = one.lit.intensities.mean(axis=1)[:, None]
     used = (lights - counts).astype(int)
-    wider = widened(one.lit.directions * strengths, d.MOST_WIDENED).astype(float)[used]
+    wider = widened(one.lit.directions * strengths, of_signs.MOST_WIDENED).astype(float)[used]
     noise = points.fit_of_noise_deg.astype(float) ** 2 * (1 if plain else wider)
-    squares = np.where(known, fit**2 - d.UNSURE_OF_NOISE * noise, 0)
+    squares = np.where(known, fit**2 - of_around.UNSURE_OF_NOISE * noise, 0)
     if turned_deg is not None:
-        squares *= cv2.blur(turned_deg, (d.OF_MOTION, d.OF_MOTION)) < d.MOVING_DEG
-    widths = [d.width_of(known, share) for share in (d.AROUND, d.FAR_AROUND)]
+        squares *= cv2.blur(turned_deg, (of_signs.OF_MOTION, of_signs.OF_MOTION)) < of_signs.MOVING_DEG
+    widths = [thin.width_of(known, share) for share in (thin.AROUND, thin.FAR_AROUND)]
     shown = np.minimum(albedo, albedo.sum() / known.sum())
     common = (noise * albedo**2).sum() / (albedo**2).sum()
     unsure = np.minimum(noise, common) * (plain | (used > 3))
-    outlying = d.OUTLYING_OF_ONE if lights == 4 else d.OUTLYING_OF_MORE
+    outlying = of_around.OUTLYING_OF_ONE if lights == 4 else of_around.OUTLYING_OF_MORE
 
     def roots(of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         surely, likely = [], []
         for width in widths:
             weight, count = mean(shown, width), mean((shown > 0).astype(float), width) * width**2
-            chance = d.CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * mean(noise * shown, width) / weight
+            chance = of_around.CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * mean(noise * shown, width) / weight
             typical = mean(of * shown, width) / weight
-            for _ in range(d.TURNS):
-                most = d.OUTLYING**2 * np.maximum(typical, d.LEAST_LEVEL_DEG**2) + outlying * noise
+            for _ in range(of_around.TURNS):
+                most = of_around.OUTLYING**2 * np.maximum(typical, of_around.LEAST_LEVEL_DEG**2) + outlying * noise
                 typical = mean(np.minimum(of, most) * shown, width) / weight
-            margin = (d.UNSURE_OF_NOISE - 1) * mean(unsure * shown, width) / weight
+            margin = (of_around.UNSURE_OF_NOISE - 1) * mean(unsure * shown, width) / weight
             surely.append(np.sqrt(np.maximum(typical - chance, 0)))
             likely.append(np.sqrt(np.maximum(typical + margin, 0)))
         return np.maximum(*surely), np.maximum(*likely)
@@ -93,13 +98,13 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
     uneven = np.zeros(SHAPE)
     if plain and lights > 3:
         share = (roots(changes_in_numpy(fit, known, noise, lights - 3))[0] / np.maximum(misfit_deg, 1e-6)) ** 2
-        uneven = np.clip((share - d.SURFACES_UNEVEN) / (1 - d.SURFACES_UNEVEN), 0, 1)
+        uneven = np.clip((share - of_signs.SURFACES_UNEVEN) / (1 - of_signs.SURFACES_UNEVEN), 0, 1)
     torn = torn_in_numpy(points)
-    sure = torn - d.SURELY_TORN**2 * (noise_deg**2 + uneven * misfit_deg**2)
-    likely = torn - d.SURELY_TORN**2 * uneven * misfit_deg**2 - d.TORN_OF_NOISE**2 * noise_deg**2
+    sure = torn - of_torn.SURELY_TORN**2 * (noise_deg**2 + uneven * misfit_deg**2)
+    likely = torn - of_torn.SURELY_TORN**2 * uneven * misfit_deg**2 - of_torn.TORN_OF_NOISE**2 * noise_deg**2
     around, far_around = widths
-    far = mean(sums, far_around) / np.maximum(mean(counts, far_around), d.LEAST_LIGHTS)
-    near = (mean(sums, around) + d.LEAST_LIGHTS * far) / (mean(counts, around) + d.LEAST_LIGHTS)
+    far = mean(sums, far_around) / np.maximum(mean(counts, far_around), of_signs.LEAST_LIGHTS)
+    near = (mean(sums, around) + of_signs.LEAST_LIGHTS * far) / (mean(counts, around) + of_signs.LEAST_LIGHTS)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(noise_deg), 0)
     added = np.linalg.pinv(one.lit.directions) @ np.ones(lights)
     along = np.tensordot(added, points.planes.astype(float), 1)
@@ -113,12 +118,12 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
         likely_torn_deg=np.sqrt(np.maximum(likely, 0)),
         noise_deg=noise_deg,
         lost_deg=noise_deg * np.sqrt(wider - 1),
-        hidden=d.hidden_by(lights) / d.hidden_by(d.ENOUGH_LIGHTS),
+        hidden=of_signs.hidden_by(lights) / of_signs.hidden_by(of_signs.ENOUGH_LIGHTS),
     )
 
 
 def changes_in_numpy(fit: np.ndarray, known: np.ndarray, noise: np.ndarray, free: int) -> np.ndarray:
-    apart, total, count = d.UNEVEN_PX, np.zeros(SHAPE), np.full(SHAPE, 1e-9)
+    apart, total, count = of_signs.UNEVEN_PX, np.zeros(SHAPE), np.full(SHAPE, 1e-9)
     for axis in (0, 1):
         ends = slice(None), slice(None, -apart)
         here, there = (ends[::-1], (slice(apart, None), slice(None))) if axis == 0 else (ends, np.s_[:, apart:])
@@ -126,21 +131,21 @@ def changes_in_numpy(fit: np.ndarray, known: np.ndarray, noise: np.ndarray, free
         total[here] += np.where(both, (fit[here] - fit[there]) ** 2 / 2, 0)
         count[here] += both
     typical = {1: np.sqrt(2 / np.pi), 5: np.sqrt(2 / 5) * 2 / (0.75 * np.sqrt(np.pi))}[free]  # of chi, over its size
-    return np.asarray(total / count / (1 - typical**2) - d.UNSURE_OF_NOISE * noise)
+    return np.asarray(total / count / (1 - typical**2) - of_around.UNSURE_OF_NOISE * noise)
 
 
 def torn_in_numpy(points: ThinSurface) -> np.ndarray:
     across, up, towards = points.planes.astype(float)
-    facing, known = np.maximum(towards, d.LEAST_FACING), points.known
+    facing, known = np.maximum(towards, of_torn.LEAST_FACING), points.known
     right, down = -across / facing, up / facing
     within, whole = np.zeros(SHAPE), np.zeros(SHAPE)
     within[:-1, :-1] = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
     along, over = right[:, :-1] + right[:, 1:], down[:-1] + down[1:]
     seen = (facing[:-1, :-1] + facing[1:, :-1] + facing[:-1, 1:] + facing[1:, 1:]) / 4
     whole[:-1, :-1] = (along[:-1] - along[1:] + over[:, 1:] - over[:, :-1]) / 2 * seen**1.5
-    whole = np.clip(whole, -d.MOST_TORN, d.MOST_TORN) * within
-    each = np.degrees(mean(whole, d.TORN) / mean(within, d.TORN)) * d.TORN / 2
-    return np.asarray(mean(each**2 * within, d.NEAR) / mean(within, d.NEAR))
+    whole = np.clip(whole, -of_torn.MOST_TORN, of_torn.MOST_TORN) * within
+    each = np.degrees(mean(whole, of_torn.TORN) / mean(within, of_torn.TORN)) * of_torn.TORN / 2
+    return np.asarray(mean(each**2 * within, of_torn.NEAR) / mean(within, of_torn.NEAR))
 
 
 def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:

@@ -12,7 +12,7 @@ from psvideo.model.surface import MEASURED, Misfit, Reflectance, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving
-from psvideo.solve.normals.trust import doubting, few_checked
+from psvideo.solve.normals.trust import few_checked, signs
 
 Array = NDArray[np.float64]
 SIZE = 72
@@ -65,7 +65,7 @@ def solved(shade: Callable[[Array, Array], Array], noise: float = 0.001) -> tupl
 
 
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doubting, "turned_by_model_deg", lambda *_: None)
+    monkeypatch.setattr(signs, "turned_by_model_deg", lambda *_: None)
 
 
 def test_a_sheen_under_four_lights_is_counted_in_what_normals_may_be_off_by(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,11 +15,14 @@ from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, slope_ag
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.surface_bits import stored
 from psvideo.solve.normals.task import Task, Usable, Work, empty_result
-from psvideo.solve.normals.trust.doubting import Signs, ThinSurface, doubt_deg, signs_of, stored
+from psvideo.solve.normals.trust.doubting import doubt_deg
 from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import judged as judged_by_signs
+from psvideo.solve.normals.trust.signs import Signs, signs_of
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.normals.trust.unchecked import unchecked_deg
 
 SIZE = 96

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.vectors import pixels_per_s
 
 ROWS, COLS = 120, 160

@@ -9,7 +9,6 @@ import pytest
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.trust.doubting import ThinSurface
 from psvideo.solve.normals.trust.moving_doubt import (
     MOST_DEG,
     Checked,
@@ -18,6 +17,7 @@ from psvideo.solve.normals.trust.moving_doubt import (
     moved_deg,
     moving_doubt_deg,
 )
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
 SIDE = 96
 HOW = MovingDoubt()

@@ -6,7 +6,8 @@ import pytest
 from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.plates.align.velocity import moving
 from psvideo.plates.align.velocity.flow import Sketch, sketch_of
-from psvideo.plates.align.velocity.moving import Pair, followed_at
+from psvideo.plates.align.velocity.followed import Pair
+from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import made
 

@@ -11,7 +11,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
-from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.demultiplexed import Making, makings_of, plate_of_light
 from psvideo.plates.split import Plate

@@ -19,8 +19,8 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import Surface
 from psvideo.plates.sequence import POOLED_ROUNDS
 from psvideo.solve.normals.bands import BAND_PIXELS
+from psvideo.solve.normals.surface_bits import bits, stored
 from psvideo.solve.normals.task import Bytes
-from psvideo.solve.normals.trust.doubting import bits, stored
 from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
 
 Flags = NDArray[np.bool_]

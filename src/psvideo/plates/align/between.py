@@ -17,7 +17,7 @@ from psvideo.model.channels import brightest_channel
 from psvideo.model.coded import Image
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
-from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import Reader, made

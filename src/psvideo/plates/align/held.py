@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
-from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS
 

@@ -19,7 +19,8 @@ from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Codes, Vectors
-from psvideo.plates.align.velocity.moving import Followed, Pair, followed_at
+from psvideo.plates.align.velocity.followed import Followed, Pair
+from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.align.velocity.moving_kernel import NOWHERE
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over

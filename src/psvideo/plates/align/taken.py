@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from psvideo.plates.align.doubt.evenly import EACH_PX, evenly_changed
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
+from psvideo.plates.align.velocity.all_lights import SHADING_PX
 from psvideo.plates.align.velocity.brightness import light_of
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors, comparable, noise_between, pixel_places
-from psvideo.plates.align.velocity.moving import SHADING_PX, Followed, Pair, odd_width
+from psvideo.plates.align.velocity.followed import Followed, Pair, odd_width
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
 
 UNLIKE = 10.0

@@ -15,7 +15,7 @@ from psvideo.export.sequences.plate_files import plate_name, write_light, write_
 from psvideo.export.sequences.result_files import Delivery, write_surface
 from psvideo.export.sequences.tags import Tags
 from psvideo.model.choices import Compression
-from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.light_plate import LightPlate

@@ -9,7 +9,7 @@ import numpy as np
 from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.plates.align.velocity.brightness import ROOT_TOE, SCALE
 from psvideo.plates.align.velocity.flow import Codes, Vectors
-from psvideo.plates.align.velocity.moving import Followed, Pair, odd_width
+from psvideo.plates.align.velocity.followed import Followed, Pair, odd_width
 
 WINDOW_PX = 3
 """Plates are compared over this many pixels of their sketches: edges that come to lie beside each other are narrow."""

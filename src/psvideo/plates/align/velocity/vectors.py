@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.plates.align.velocity.flow import Flags, Vectors
-from psvideo.plates.align.velocity.moving import Followed, odd_width
+from psvideo.plates.align.velocity.followed import Followed, odd_width
 
 GAPS_PX = 9
 """Gaps of this many pixels in what moves are closed: outlines along the motion show nothing of it."""

@@ -16,18 +16,13 @@ from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise
+from psvideo.solve.normals.surface_bits import bits, stored
 from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
-from psvideo.solve.normals.trust.doubting import (
-    Doubting,
-    Signs,
-    ThinSurface,
-    bits,
-    doubt_deg,
-    signs_of,
-    stored,
-)
+from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
+from psvideo.solve.normals.trust.signs import Signs, signs_of
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
 
 

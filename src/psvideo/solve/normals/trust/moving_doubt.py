@@ -9,7 +9,7 @@ from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Floats, Mask
-from psvideo.solve.normals.trust.doubting import ThinSurface, width_of
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, width_of
 
 MOST_DEG = np.float32(180)
 """What turns a normal by more is no angle: nothing is known of its plates."""

@@ -1,0 +1,165 @@
+"""The plates of all lights around an instant: which velocities they propose, and how unlike they are along one.
+
+Flow between the plates of single lights (before and after the instant) proposes velocities, and so does what the
+picture's change as a whole correlates with, where flow does not reach. Plates are compared by their detail, since
+shading changes as surfaces turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from psvideo.compute.threads import over_ranges
+from psvideo.plates.align.velocity.correlation import displacements
+from psvideo.plates.align.velocity.flow import (
+    FINE_PIXELS,
+    Codes,
+    Flags,
+    Vectors,
+    comparable,
+    flow_from,
+    pixel_places,
+)
+from psvideo.plates.align.velocity.followed import Pair, mean_over, odd_width
+from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
+
+MOST_FLOWS = 4
+"""Flow is computed between the plates of at most this many lights, evenly spread: more give the same proposals."""
+STILL_CODES, STILL_LIGHTS, STILL_SHARE, STILL_PX = 3.0, 2, 0.7, 3
+"""Pixels that change by fewer codes than the first, under at least two lights and this share of all, are at rest: what
+changes under the other lights is a shadow, or something that passes."""
+FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
+"""Before they are compared, sketches are smoothed by the first, and most of what is wider than the second is removed:
+as surfaces turn, their shading changes, their detail does not."""
+CONTRAST = 10.0
+"""The most contrast of detail, in codes, over such a window; more is scaled down to it: as surfaces turn, the edges
+between them stay in place, but the light on either side changes."""
+FAR = 2
+"""Then this many displacements of all changing parts together are tried."""
+COARSE = 2
+"""Sketches of FINE_PIXELS and more get a velocity in every second row and column: flow is no finer there."""
+BAND_PIXELS = 1 << 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllLights:
+    """The lights' codes as flow sees them (before, after), their detail (light, row, col), and the times to them."""
+
+    codes: tuple[tuple[Codes, Codes], ...]
+    befores: Codes
+    afters: Codes
+    spans_s: Vectors
+
+    @classmethod
+    def of(cls, pairs: Sequence[Pair], time_s: float) -> "AllLights":
+        """Make the plates of pairs comparable at an instant."""
+        codes = tuple(comparable(pair.before, pair.after) for pair in pairs)
+        befores, afters = np.empty((2, len(pairs), *codes[0][0].shape), np.uint8)
+
+        def sharpen(light: int, _: int) -> None:
+            befores[light], afters[light] = (_detail(picture) for picture in codes[light])
+
+        over_ranges(sharpen, len(pairs), each=1)
+        spans_s = [(time_s - pair.before.time_s, pair.after.time_s - time_s) for pair in pairs]
+        return cls(codes=codes, befores=befores, afters=afters, spans_s=np.array(spans_s, np.float32))
+
+    @property
+    def count(self) -> int:
+        """How many lights there are."""
+        return len(self.codes)
+
+    @property
+    def step(self) -> int:
+        """How many pixels of the sketches lie between two velocities."""
+        return COARSE if self.befores[0].size >= FINE_PIXELS else 1
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many velocities there are, (row, col)."""
+        rows, cols = self.befores.shape[1:]
+        return rows // self.step, cols // self.step
+
+    def mean(self, values: Vectors, window_px: int) -> Vectors:
+        """Return means over windows of this many pixels of the sketches."""
+        return mean_over(values, odd_width(window_px, self.step))
+
+    def unlike(self, velocity: Vectors) -> Vectors:
+        """Return how unlike all lights' plates are along velocities, shape (row, col), 0 to the number of lights."""
+        out = np.empty(self.shape, np.float32)
+
+        def run(first: int, last: int) -> None:
+            unlike_rows(self.befores, self.afters, self.spans_s, velocity, first, last, out)
+
+        over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
+        return out
+
+    def stays(self, velocity: Vectors) -> Flags:
+        """Return what is within the picture at both ends of its way: the rest is hidden in one plate of every light."""
+        before_s, after_s = (np.float32(span_s) for span_s in self.spans_s.mean(axis=0))
+        within = np.ones(self.shape, np.bool_)
+        for places, own, size in zip(pixel_places(*self.shape), velocity, self.shape[::-1], strict=True):
+            for ends in (places - before_s * own, places + after_s * own):
+                within &= (ends >= 0) & (ends <= size - 1)
+        return within
+
+    def stirs(self) -> Flags:
+        """Return what is not at rest, shape (row, col)."""
+        count = np.zeros(self.shape, np.intp)
+        for one, other in self.codes:
+            change = cv2.GaussianBlur(cv2.subtract(other, one, dtype=cv2.CV_32F), (0, 0), FINEST_PX)
+            still = mean_over(np.asarray(change * change, np.float32), STILL_PX) < STILL_CODES**2
+            count += still[: self.step * len(count) : self.step, : self.step * count.shape[1] : self.step]
+        return np.asarray(count < max(STILL_LIGHTS, STILL_SHARE * self.count))
+
+    def proposed(self) -> list[Vectors]:
+        """Return the velocities that flow proposes: both ways of few lights, one way of each of more."""
+        chosen = _spread(self.count, MOST_FLOWS)
+        ways = [(light, bool(n % 2)) for n, light in enumerate(chosen)]
+        if len(chosen) <= MOST_FLOWS // 2:
+            ways = [(light, back) for light in chosen for back in (False, True)]
+        return self._flows([(light, back, None) for light, back in ways])
+
+    def proposed_far(self) -> list[Vectors]:
+        """Return velocities of what moved farther than flow reaches by itself."""
+        found = displacements([tuple(map(_smoothed, pair)) for pair in self.codes], FAR)
+        some = _spread(self.count, MOST_FLOWS // FAR)
+        constant = [np.empty((2, *self.shape), np.float32) for _ in found]
+        for plane, (x, y) in zip(constant, found, strict=True):
+            plane[0], plane[1] = np.array([x, y]) / self.step / self.spans_s.sum(axis=1).mean()
+        return constant + self._flows([(light, bool(n % 2), place) for place in found for n, light in enumerate(some)])
+
+    def _flows(self, ways: list[tuple[int, bool, tuple[float, float] | None]]) -> list[Vectors]:
+        def run(first: int, _: int) -> Vectors:
+            light, back, start_px = ways[first]
+            since_s, until_s = (float(span) for span in self.spans_s[light])
+            one, other = self.codes[light]
+            sign = -1.0 if back else 1.0
+            start = None if start_px is None else (sign * start_px[0], sign * start_px[1])
+            flow = flow_from(other, one, start) if back else flow_from(one, other, start)
+            round_s = since_s + until_s
+            out = np.empty((2, *self.shape), np.float32)
+            share = np.float32((until_s if back else since_s) / round_s)
+            arriving_rows(flow, share, np.float32(sign / round_s), 0, out.shape[1], out)
+            return out
+
+        return over_ranges(run, len(ways), each=1)
+
+
+def _spread(count: int, most: int) -> list[int]:
+    return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
+
+
+def _smoothed(codes: Codes) -> Vectors:
+    return np.asarray(cv2.GaussianBlur(codes.astype(np.float32), (0, 0), FINEST_PX), np.float32)
+
+
+def _detail(codes: Codes) -> Codes:
+    smooth = _smoothed(codes)
+    shading = mean_over(smooth, SHADING_PX)
+    detail = smooth - shading
+    contrast = np.sqrt(np.maximum(mean_over(detail * detail, SHADING_PX), 0))  # sums that run along rows round
+    detail *= np.float32(CONTRAST) / np.maximum(contrast, np.float32(CONTRAST))
+    detail += np.float32(1 - SHADING) * shading
+    return np.asarray(np.clip(detail + np.float32(64.5), 0, 255), np.uint8)

@@ -1,0 +1,56 @@
+"""What is followed, and what comes of it: plates of a light in pairs, and one velocity for every pixel."""
+
+import functools
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from psvideo.plates.align.velocity.flow import Flags, Sketch, Vectors
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """The sketches of a light before and after an instant, in the same brightness."""
+
+    before: Sketch
+    after: Sketch
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """``velocity`` (2, row, col) is x right, y down, in its own pixels per second, 0 where not ``moves``. ``rests``
+    (row, col) is what clearly stands beside that; the rest looks alike either way. Each of these pixels is ``step`` by
+    ``step`` of the sketches'."""
+
+    time_s: float
+    velocity: Vectors
+    moves: Flags
+    rests: Flags
+    step: int = 1
+
+    @functools.cached_property
+    def nearby(self) -> Vectors:
+        """The velocity of what moves nearest to every pixel, (2, row, col)."""
+        if not self.moves.any():
+            return self.velocity
+        still = (~self.moves).astype(np.uint8)
+        labels = cv2.distanceTransformWithLabels(still, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)[1]
+        of_label = np.zeros((2, int(labels.max()) + 1), np.float32)
+        of_label[:, labels[self.moves]] = self.velocity[:, self.moves]
+        return of_label[:, labels]
+
+    def way(self, span_s: float) -> Vectors:
+        """Return how far every pixel goes in a time, shape (2, row, col)."""
+        return np.float32(span_s) * self.velocity
+
+
+def odd_width(window_px: int, step: int) -> int:
+    """Return the width of a window of ``window_px`` in pixels of ``step`` of the sketches': an odd number, 3 or more (1
+    stays 1)."""
+    return max(window_px // step | 1, min(window_px, 3))
+
+
+def mean_over(values: Vectors, window_px: int) -> Vectors:
+    """Return means over windows of this many of the values' own pixels."""
+    return np.asarray(cv2.blur(values, (window_px, window_px)), np.float32)

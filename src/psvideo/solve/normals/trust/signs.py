@@ -1,0 +1,159 @@
+"""What speaks against normals: residuals, light from around, and normals that belong to no surface.
+
+These signs are looked for on a coarse grid, and around every pixel, since they are smooth where noise is not. What the
+lights leave unexplained says how far the model is from the surface. Light that shows where a lamp does not reach came
+by way of other surfaces, which light everything alike and leave no residual. And normals that belong to no surface are
+wrong whatever the lights say of them (``torn.py``).
+"""
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.task import Floats
+from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
+from psvideo.solve.normals.trust.fewer_lights import widened
+from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
+from psvideo.solve.normals.trust.torn import torn_angles_deg
+
+MOST_FIT_DEG = np.float32(24)
+"""What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
+MOST_WIDENED = 5.0
+"""Where fewer lights reach, noise and what residuals predict of it spread farther: up to this many times the square."""
+MOVING_DEG, OF_MOTION = np.float32(0.5), 5
+"""Where motion turns normals by more, over this many points, residuals are its own, and no misfit of rig or surface."""
+UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
+"""Samples this far apart are compared: a codec's errors are alike in nearer ones. The misfit of surfaces changes by
+up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
+ENOUGH_LIGHTS = 12
+"""What ``hidden`` is measured by: this many lights hide little of what is not matte."""
+LEAST_LIGHTS = 0.02
+"""Light from around is known where at least this many lights, in the mean, do not reach a point."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signs:
+    """What is looked for, (row, col) of the points, in degrees: what residuals surely predict beyond noise, by which
+    angle light from around would turn the normal, by which normals around surely belong to no surface, and what noise
+    makes more where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is
+    not matte. ``uneven``: the share of the misfit that changes from sample to sample, as errors of codecs do and
+    surfaces do not: of that nothing is hidden. ``likely_misfit_deg``, ``likely_torn_deg``: the first and third without
+    a margin for what noise could be instead; ``noise_deg`` is what noise makes of the normals. ``unchecked_deg``: what
+    lights that cannot be held against each other leave of real surfaces, though nothing shows; it counts in errors, and
+    not in what is trusted. ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals
+    under four and five lights (``few_checked.py``)."""
+
+    misfit_deg: Floats
+    indirect_deg: Floats
+    torn_deg: Floats
+    lost_deg: Floats
+    hidden: float
+    likely_misfit_deg: Floats
+    likely_torn_deg: Floats
+    noise_deg: Floats
+    uneven: Floats | float = 0.0
+    unchecked_deg: Floats | float = 0.0
+    by_model_deg: Floats | float = 0.0
+
+    def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
+        """Return the signs of some of the points."""
+        shape = self.misfit_deg.shape
+        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "hidden"}
+        here: dict[str, Any] = {name: np.broadcast_to(value, shape)[some] for name, value in each.items()}
+        return replace(self, **here)
+
+
+def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None) -> Signs:
+    """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
+    misfit of rig or surface. Raises ValueError where nobody looked for light from around."""
+    if one.indirect is None:
+        raise ValueError("`indirect` expected in the evidence: see indirect.py")
+    lights, plain = len(one.plates), points.surface.error_deg is None
+    strengths = one.lit.intensities.mean(axis=1)[:, None]
+    wider = widened(one.lit.directions * strengths, MOST_WIDENED)
+    squares, noise, shown = _beyond_noise(points, one.indirect.counts, wider)
+    still = points.known
+    if turned_deg is not None:
+        rests = cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
+        squares *= rests
+        still = still & rests
+    surroundings = Surroundings.both(points, noise, shown, one)
+    misfit_deg, likely_deg = roots(squares, surroundings)
+    uneven = np.zeros_like(noise)
+    if plain and lights > 3:
+        changing_deg, _ = roots(_changes(points, noise, lights - 3), surroundings)
+        share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
+        uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
+    torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven)
+    used = (lights - one.indirect.counts).astype(np.intp)
+    by_model = turned_by_model_deg(points.surface, points.step, one, still)
+    return Signs(
+        misfit_deg=misfit_deg,
+        likely_misfit_deg=likely_deg,
+        uneven=uneven,
+        indirect_deg=_indirect_deg(points, one, one.indirect),
+        torn_deg=torn_deg,
+        likely_torn_deg=likely_torn_deg,
+        noise_deg=points.noise_deg,
+        lost_deg=points.noise_deg * np.sqrt(wider - 1)[used],
+        hidden=hidden_by(lights) / hidden_by(ENOUGH_LIGHTS),
+        by_model_deg=0.0 if by_model is None else by_model,
+    )
+
+
+def _beyond_noise(points: ThinSurface, counts: Floats, wider: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the squares of what residuals predict beyond noise, those of noise, and the albedo where anything is
+    known; ``counts`` lights do not reach a point, and ``wider`` is by how much noise grows with those that do."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_squares
+
+    squares, noise, shown = np.empty((3, *points.known.shape), np.float32)
+    plain = points.surface.error_deg is None
+    fill_squares(
+        line(points.fit_deg), line(points.fit_of_noise_deg), points.known_bytes.reshape(-1), line(points.brightness),
+        line(counts), wider, plain, float(UNSURE_OF_NOISE), float(MOST_FIT_DEG), line(squares), line(noise),
+        line(shown),
+    )  # fmt: skip
+    return squares, noise, shown
+
+
+def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
+    """Return the square of what residuals predict, as far as it changes from sample to sample beyond noise: a root of
+    ``free`` squares of independent numbers varies so much about its mean."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_changes
+
+    mean = np.sqrt(2 / free) * math.gamma((free + 1) / 2) / math.gamma(free / 2)
+    changes, apart = np.empty_like(noise), max(UNEVEN_PX // points.step, 1)
+    most, scale, unsure = float(MOST_FIT_DEG), float(1 / (1 - mean * mean)), float(UNSURE_OF_NOISE)
+    fit = np.ascontiguousarray(points.fit_deg)
+    fill_changes(fit, points.known_bytes, noise, apart, most, scale, unsure, changes)
+    return changes
+
+
+def hidden_by(lights: int) -> float:
+    """Return all lights over those that a normal and an albedo leave to be held against them.
+
+    >>> hidden_by(5), hidden_by(12)
+    (2.5, 1.3333333333333333)
+    """
+    return lights / max(lights - 3, 1)
+
+
+def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
+    """Return by how many degrees light from around turns the normals. Least squares takes light that every lamp adds
+    alike for a vector, of which what lies across the normal turns it."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_indirect_deg
+
+    near, far = (np.stack([blurred(plane, width) for plane in seen]).reshape(2, -1) for width in points.widths)
+    added = (np.linalg.pinv(one.lit.directions) @ np.ones(len(one.plates))).astype(np.float32)
+    turned = np.empty(points.known.shape, np.float32)
+    fill_indirect_deg(
+        points.planes.reshape(3, -1), line(seen.sums), line(seen.counts), near, far, line(points.noise_deg), added,
+        LEAST_LIGHTS, line(turned),
+    )  # fmt: skip
+    return turned

@@ -1,0 +1,80 @@
+"""The coarse grid of points at which a surface is judged, and means over squares of it.
+
+What speaks against normals is smooth, and noise is not: so it is looked for at every nth row and column, and around
+every such point.
+"""
+
+import functools
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.task import Bytes, Floats
+
+AROUND, FAR_AROUND, LEAST_AROUND = 0.1, 0.5, 7
+"""The rest is looked at around a point, over such shares of the subject's size (the root of its points), whatever the
+picture's, and over no less than this many points: their residuals are of noise as well."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThinSurface:
+    """Every ``step``-th row and column of a surface, and errors there in degrees: what noise makes, what residuals
+    predict, and what they would predict of nothing but noise."""
+
+    step: int
+    surface: Surface
+    noise_deg: Floats
+    fit_deg: Floats
+    fit_of_noise_deg: Floats
+
+    @cached_property
+    def planes(self) -> Floats:
+        """The normals, (3, row, col)."""
+        return np.ascontiguousarray(np.moveaxis(self.surface.normals, -1, 0), np.float32)
+
+    @cached_property
+    def brightness(self) -> Floats:
+        """Albedo (row, col), of three channels their mean."""
+        return brightness(self.surface.albedo)
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Where there is a normal."""
+        return self.surface.valid
+
+    @cached_property
+    def widths(self) -> tuple[int, int]:
+        """How many points are around a point, and far around."""
+        return width_of(self.known, AROUND), width_of(self.known, FAR_AROUND)
+
+    @cached_property
+    def known_bytes(self) -> Bytes:
+        """The same, as compiled loops take it."""
+        return np.ascontiguousarray(self.surface.valid).view(np.uint8)
+
+
+def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
+    """Return how many points, an odd number, are a share of the size of a subject of all ``known`` ones."""
+    return max(int(share * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 1, LEAST_AROUND)
+
+
+def brightness(albedo: NDArray[np.floating]) -> Floats:
+    """Return albedo (row, col), of three channels their mean."""
+    if albedo.ndim == 2:
+        return np.asarray(albedo, np.float32)
+    total = functools.reduce(np.add, np.moveaxis(albedo, -1, 0).astype(np.float32))  # numpy is slow along a short axis
+    return np.asarray(total / np.float32(albedo.shape[-1]), np.float32)
+
+
+def line(plane: Floats) -> Floats:
+    """Return a plane as one line of float32, in the same memory where it is one."""
+    return np.ascontiguousarray(plane, np.float32).reshape(-1)
+
+
+def blurred(plane: Floats, width: int, into: Floats | None = None) -> Floats:
+    """Return means over squares, beyond whose borders there is nothing."""
+    return np.asarray(cv2.blur(plane, (width, width), into, borderType=cv2.BORDER_CONSTANT), np.float32)

@@ -1,0 +1,31 @@
+"""Normals that belong to no surface: along a closed way the slopes of a surface add up to nothing."""
+
+import math
+
+import numpy as np
+
+from psvideo.solve.normals.task import Floats
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
+
+TORN, NEAR = 5, 9
+"""Slopes are added up along the edges of squares of this many points, averaged over those of the second."""
+LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
+"""Slopes are those of normals that face the camera at least this much; and around four points they count up to this
+much, since where one thing is before another they say nothing of either."""
+TORN_OF_NOISE, SURELY_TORN = np.float32(0.27), np.float32(0.35)
+"""How much of what noise does to a normal shows in slopes added up: on nothing but noise, and with a margin."""
+
+
+def torn_angles_deg(points: ThinSurface, misfit_deg: Floats, uneven: Floats) -> tuple[Floats, Floats]:
+    """Return the angle by which the normals around every point surely cannot be one surface's, and likely: around any
+    four points the slopes of a surface add up to 0, and what these add up to is averaged over a square."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_torn, fill_torn_deg, square_torn
+
+    torn = np.empty((*points.known.shape, 2), np.float32)
+    fill_torn(points.planes, points.known_bytes, float(LEAST_FACING), float(MOST_TORN), torn)
+    square_torn(blurred(torn, TORN).reshape(-1, 2), torn.reshape(-1, 2), math.degrees(TORN / 2))
+    angles = np.empty((2, *points.known.shape), np.float32)
+    given = line(points.noise_deg), line(misfit_deg), line(uneven)
+    shares = float(SURELY_TORN), float(TORN_OF_NOISE)
+    fill_torn_deg(blurred(torn, NEAR).reshape(-1, 2), *given, *shares, angles.reshape(2, -1))
+    return angles[0], angles[1]
