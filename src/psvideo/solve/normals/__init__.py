@@ -1,8 +1,9 @@
 """From one plate per light to normals and albedo, and how far to trust them.
 
 ``solving`` chooses the solver and calls it: begin there. All solvers take the same values: the lights
-(``illumination``), plates and lights as plain arrays (``task``), shared between threads in bands of rows (``bands``),
-and how noisy plates are (``plate_noise``). ``evidence`` keeps one round together for what looks at it again.
+(``illumination``), plates and lights as plain arrays (``task``), surfaces too (``surface_bits``), shared between
+threads in bands of rows (``bands``), and how noisy plates are (``plate_noise``). ``evidence`` keeps one round together
+for what looks at it again.
 
 Rooms, from the bottom up:
 
