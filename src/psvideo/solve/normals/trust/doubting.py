@@ -42,7 +42,7 @@ class Doubting:
     torn: float = 2.5
     torn_beside: float = 0.5
     torn_alone_deg: float = 0.1
-    by_model: float = 0.6
+    by_model: float = 0.75
 
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
