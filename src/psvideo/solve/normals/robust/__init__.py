@@ -1,5 +1,5 @@
-"""The robust solver: least squares in which shadows and highlights weigh little. ``huber1981`` is the method, and
-``weighing`` holds its settings.
+"""The robust solver: least squares in which shadows and highlights weigh little. ``huber1981`` is the method,
+``weighing`` holds its settings, and ``solution`` what it solves and where that goes.
 
 A block of pixels goes through ``robust_kernel``:
 

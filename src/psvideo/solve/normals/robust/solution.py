@@ -1,0 +1,124 @@
+"""A picture's task for the robust solver, and where its solution goes as the loops run over its rows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.compute.spilled import let_go, planes_for
+from psvideo.model.surface import Surface
+from psvideo.plates.mixing.mixture import Mixture
+from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import (
+    FEW,
+    Floats,
+    Looks,
+    Mask,
+    Result,
+    Samples,
+    Task,
+    Usable,
+    Weights,
+    Work,
+    empty_result,
+    let_rows_go,
+    task,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """A picture's task, and where its solution and ``predicted`` errors (pixel,) go as the loops run over its rows."""
+
+    shown: ShownPlates
+    given: Task
+    result: Result
+    predicted: Samples
+    half: bool
+    residual: bool
+    threads: int | None
+
+    @classmethod
+    def of(
+        cls, plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, seen: Mask | None, mask: Mask | None,
+        usable: Usable, black_level: float, scale: float,
+        *, half: bool, residual: bool, spare: Path | None, threads: int | None = None,
+    ) -> "Solution":  # fmt: skip
+        """Make room for the solution of plates; arguments are those of ``solve``."""
+        shown = ShownPlates.of(plates)
+        check_arrays(shown.samples, lit, seen, mask)
+        shown = shown.as_floats()  # one kind of samples, and so one loop to compile
+        (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
+        return cls(
+            shown=shown,
+            given=_balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale)),
+            result=empty_result(rows * cols, channels, half=half, residual=residual, spare=spare),
+            predicted=planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare),
+            half=half,
+            residual=residual,
+            threads=threads,
+        )
+
+    def run(
+        self,
+        how: Weights,
+        *,
+        error: bool = True,
+        unexplained: Floats | None = None,
+        step: int = 1,
+        reflecting: bool = False,
+        looks: Looks | None = None,
+    ) -> None:
+        """Solve every ``step``-th row. ``error`` asks for predicted errors; ``unexplained`` (pixel,) takes the share of
+        its light that each pixel's lights leave unexplained. ``looks`` looks at each band while it is in memory."""
+        from psvideo.solve.normals.robust import robust_kernel as kernel
+
+        cols, result, predicted = self.shown.shape[1], self.result, self.predicted
+        into = (predicted if error else predicted[:0]).view(np.uint8)
+        left = np.zeros(0, np.float32) if unexplained is None else unexplained
+
+        def memory(one: Task) -> tuple[kernel.Memory, Work | None]:
+            own = kernel.working_memory(one, reflecting=reflecting, residual=self.residual)
+            return own, None if looks is None else looks.memory()
+
+        def band(one: Task, room: tuple[kernel.Memory, Work | None], first: int, last: int) -> None:
+            own, beside = room
+            kernel.solve_rows(one, kernel.as_bytes(result), self.half, into, left, own, how, first, last, step)
+            if looks is not None and beside is not None:
+                looks.look(one, result, beside, first, last)
+            let_rows_go(result, cols, first, last)
+            let_go(predicted[first * cols : last * cols])
+
+        self.shown.in_bands(band, self.given, memory, threads=self.threads, step=step)
+
+    def surface(self, *, error: bool = True) -> Surface:
+        """Return what was solved as a surface, in the same memory."""
+        return surface_of(self.result, self.predicted if error else None, self.shown.shape, half=self.half)
+
+
+def _balanced(given: Task) -> Task:
+    """Return the task in units in which residuals of strong and of weak lights compare, which thresholds need.
+
+    Photon noise grows with the root of a light's strength, highlights and shadows with the strength itself: dividing
+    by the root is right for the first, and between noise that is alike in all plates and the second. From four distant
+    lights on, up to FEW are filled up with lights that weigh nothing, for which there is a faster way.
+    """
+    factor = np.sqrt(given.per_strength)[: given.lights, None]
+    tone = given.tone.copy()
+    tone[: given.lights, :, :3] *= factor[..., None]
+    tone[: given.lights, :, 3] /= factor
+    matrix, per_strength = given.matrix.copy(), given.per_strength.copy()
+    matrix[: given.lights] *= factor
+    per_strength[: given.lights] /= factor[:, 0]
+    strengths = given.near.strengths.copy()  # empty where all lights are distant
+    strengths[: given.lights] *= factor[: len(strengths), 0]
+    near = given.near._replace(strengths=strengths)
+    more = max(FEW - len(tone), 0) if given.lights > 3 and not given.near.depth.size else 0
+    return given._replace(
+        tone=np.pad(tone, ((0, more), (0, 0), (0, 0)), mode="edge"),
+        matrix=np.pad(matrix, ((0, more), (0, 0))),
+        per_strength=np.pad(per_strength, (0, more), mode="edge"),
+        near=near,
+    )
