@@ -40,6 +40,7 @@ def test_without_a_folder_to_keep_it_in_code_is_compiled_all_the_same(monkeypatc
         numba.njit(cache=True)(twice)
     for arithmetic in (EXACT, FUSED, REORDERED):
         assert arithmetic.kept(twice)(21.0) == 42.0
+        assert arithmetic.kept(eval("lambda value: 2 * value"))(21.0) == 42.0, "made of a text, and not of a file"
 
 
 def full(*_: Any) -> None:
@@ -173,8 +174,8 @@ def test_code_kept_beside_its_module_is_found_whatever_folder_is_set_for_keeping
     paths = os.pathsep.join([str(tmp_path), str(SOURCE.parent)])
     plain = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"} | {"PYTHONPATH": paths}
 
-    def hits(**set_: str) -> int:
-        command = [sys.executable, "-B", "-m", "house.run"]
+    def hits(*nowhere: str, **set_: str) -> int:
+        command = [sys.executable, "-B", *(nowhere or ("-m", "house.run"))]
         done = subprocess.run(command, env=plain | set_, capture_output=True, text=True, check=True)
         return int(done.stdout.split()[1])
 
@@ -182,19 +183,26 @@ def test_code_kept_beside_its_module_is_found_whatever_folder_is_set_for_keeping
     assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 1
     os.utime(house / "outer.py", (1, 1))
     assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 1, "installing changes the dates of files"
+    nowhere = "import numba.core.caching as places; places.CacheImpl._locator_classes = []; import house.run"
+    assert hits("-c", nowhere) == 1, "an account that can write nowhere"
     (house / "numbers_.py").write_text("FACTOR = 5\n")
     assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 0, "stale, wherever it lies"
 
 
+@pytest.mark.parametrize(("kept", "said"), [(True, "kept for all later runs"), (False, "again in every run")])
 def test_compiling_is_said_once_and_not_where_quiet_is_asked_for(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    kept: bool, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])  # else a run before this one kept them
+    if kept:
+        monkeypatch.setattr(numba.core.config, "CACHE_DIR", str(tmp_path))  # else a run before this one kept them
+    else:
+        monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
     for quiet, lines in ((False, 1), (True, 0)):
         with compiling_said(quiet=quiet):
             FUSED.kept(lambda value: 5 * value)(10)
             FUSED.kept(lambda value: 6 * value)(10)
-        assert capsys.readouterr().err.count("compiling, once") == lines
+        told = capsys.readouterr().err
+        assert (told.count("psvideo: compiling"), told.count(said)) == (lines, lines)
     FUSED.kept(lambda value: 7 * value)(10)
     assert capsys.readouterr().err == ""
 
@@ -233,7 +241,7 @@ for module in pkgutil.walk_packages(psvideo.__path__, "psvideo."):
         importlib.import_module(module.name)
 from psvideo.cli.app import main
 from psvideo.sync.rowfit import kernel, row_model
-assert row_model.width._cache.cache_path is None, "nothing is kept"
+assert type(row_model.width._cache._impl.locator).__name__ == "_ReadOnly", "nothing is kept"
 matrix = np.array([[4.0, 2.0], [2.0, 5.0]])
 kernel.factor(matrix, 2)
 assert np.allclose(np.tril(matrix), [[2.0, 0.0], [1.0, 2.0]]), matrix

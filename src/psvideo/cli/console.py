@@ -90,15 +90,22 @@ class Voice:
         return Caller(say=self.say, warn=self.warn, detail=self.detail, spell=spelled, command=command)
 
 
+KEPT = (
+    "psvideo: compiling, once: this run's loops for this processor, which takes a minute or two. They are kept for all "
+    "later runs; psvideo doctor --compile does it ahead."
+)
+LOST = (
+    "psvideo: compiling this run's loops for this processor, which takes a minute or two, and will again in every run: "
+    "neither psvideo's own folder nor one in your home can be written. Set NUMBA_CACHE_DIR to a folder that can be, "
+    "and they are kept there."
+)
+
+
 class _Once(logging.Handler):
     """Says once that loops are being compiled, however many there are."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(
-            "psvideo: compiling, once: this run's loops for this processor, which takes a minute or two. They are kept "
-            "for all later runs; psvideo doctor --compile does it ahead.",
-            file=sys.stderr,
-        )
+        print(LOST if getattr(record, "lost", False) else KEPT, file=sys.stderr)
         self.setLevel(logging.CRITICAL)
 
 

@@ -20,7 +20,14 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.caching import (
+    CacheImpl,
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    InTreeCacheLocator,
+    NullCache,
+)
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime.nrt import rtsys
 
@@ -31,10 +38,33 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 _Cache: Any = FunctionCache
 _Files: Any = IndexDataCacheFile
 _NoCache: Any = NullCache
+_Beside: Any = InTreeCacheLocator
+_Places: Any = CompileResultCacheImpl
 LOG = logging.getLogger("psvideo.compiling")
-"""Says, as information, when a loop was kept nowhere and is being compiled."""
+"""Says, as information, when a loop was kept nowhere and is being compiled; a record's ``lost`` says that it cannot be
+kept either."""
 _UNREADABLE = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError)
 """What a kept file raises that is cut off, or that names what an earlier version of the package had."""
+
+
+class _ReadOnly(_Beside):  # type: ignore[misc]
+    """Beside the module, where nobody can write: what installing the package kept there is found, nothing is added."""
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "_ReadOnly | None":
+        return cls(py_func, py_file) if Path(py_file).exists() else None
+
+    def ensure_cache_path(self) -> None:
+        raise PermissionError(f"{self.get_cache_path()} cannot be written")
+
+
+class _AnyPlace(_Places):  # type: ignore[misc]
+    """Numba's places, the first of which is taken where a file can be written, and then one that is only read: an
+    account without a home, as farms and containers have, runs what somebody else installed."""
+
+    @property
+    def _locator_classes(self) -> list[Any]:
+        return [*CacheImpl._locator_classes, _ReadOnly]
 
 
 class _Kept(_Cache):  # type: ignore[misc]
@@ -42,6 +72,8 @@ class _Kept(_Cache):  # type: ignore[misc]
 
     A disk that is full, or a folder that is gone, never stops what was compiled: it is compiled again next time.
     """
+
+    _impl_class = _AnyPlace
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function)
@@ -64,22 +96,28 @@ class _Kept(_Cache):  # type: ignore[misc]
                 data = place.load(self._index_key(signature, target.codegen()))
                 if data is not None:
                     return loaded(target, data)
-        LOG.info("compiling %s", self._name)
+        LOG.info("compiling %s", self._name, extra={"lost": self._read_only})
         return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
+        if self._read_only:
+            return
         try:
             super().save_overload(signature, data)
         except _UNREADABLE:
             with contextlib.suppress(OSError):  # what an earlier version kept there would stand in the way for ever
                 Path(self._cache_file._index_path).unlink()
 
+    @property
+    def _read_only(self) -> bool:
+        return isinstance(self._impl.locator, _ReadOnly)
+
 
 class _NotKept(_NoCache):  # type: ignore[misc]
-    """Where there is no folder to keep compiled code in: every run compiles, and says so."""
+    """Code that has no file, beside which anything could be kept: every run compiles, and says so."""
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        LOG.info("compiling %s, which cannot be kept", signature)
+        LOG.info("compiling %s", signature, extra={"lost": True})
         return super().load_overload(signature, target)
 
 
@@ -97,7 +135,7 @@ class Arithmetic:
         compiled: Any = numba.njit(nogil=True, **self._options)(function)
         try:
             compiled._cache = _Kept(function, self._options)
-        except RuntimeError:  # numba's "no locator": neither beside the module nor in the user's folder can be written
+        except RuntimeError:  # numba's "no locator": the function was made of a text
             compiled._cache = _NotKept()
         result: Function = compiled
         return result
