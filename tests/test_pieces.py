@@ -33,6 +33,7 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
 from psvideo.plates.spread import rounds_spread, spread_over
 from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -293,7 +294,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     worst = Thumbnail(number=1003, badness=0.7, why="67 % valid", normals=normals, valid=valid)
     observed = Observed(
         lights=("a", "b"),
-        facts=[facts],
+        facts=KeptFacts([facts]),
         counts={"a": np.arange(5), "b": np.arange(5) * 2},
         blurs_px=[0.7],
         leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
@@ -306,7 +307,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     write_notes(tmp_path, range(1003, 1004), Found(observed=observed, picture=picture, reserved=("No scale.",)))
     ((numbers, found),) = noted(tmp_path)
     seen = found.observed
-    assert (numbers, found.reserved, seen.facts) == (range(1003, 1004), ("No scale.",), [facts])
+    assert (numbers, found.reserved, list(seen.facts)) == (range(1003, 1004), ("No scale.",), [facts])
     assert (seen.blurs_px, seen.ambient_measured) == ([0.7], {128: 0.25})
     assert (seen.leans, seen.in_shadow) == (observed.leans, [0.04])
     assert all(np.array_equal(seen.counts[light], observed.counts[light]) for light in observed.counts)

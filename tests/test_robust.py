@@ -16,6 +16,7 @@ from psvideo.model.surface import Misfit, Surface
 from psvideo.report.judge.result import accuracy
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
@@ -246,7 +247,7 @@ def test_where_nothing_can_contradict_no_misfit_is_claimed() -> None:
 def test_the_report_says_what_no_pixel_is_blamed_for() -> None:
     def judged(misfit: Misfit) -> list[Judgement]:
         one = InstantFacts(number=1001, time_s=0, valid_share=1, clipped_share=0, unseen_share=0, misfit=misfit)
-        return list(accuracy(Observed(lights=("a", "b"), facts=[one])))
+        return list(accuracy(Observed(lights=("a", "b"), facts=KeptFacts([one]))))
 
     (doubt,) = judged(Misfit(share=0.043, error_deg=9.4))  # two thirds are within it; the mean is 0.83 of it
     assert doubt.grade == "doubtful"

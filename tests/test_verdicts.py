@@ -1,5 +1,6 @@
 """Every threshold of a verdict separates footage that is just good from footage that is just not."""
 
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -28,6 +29,7 @@ from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.motion import glimpse, motion_between
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
@@ -444,7 +446,7 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
 
     def said(off_deg: float) -> tuple[str, str]:
         misfit = Misfit(share=0.1, error_deg=off_deg / result.MEAN_OF_HELD)
-        one.facts[:] = [replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0) for facts in one.facts]
+        one.facts = KeptFacts(replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0) for facts in one.facts)
         return graded(accuracy(one), "accuracy"), graded(validity(one), "validity")
 
     assert [said(off_deg) for off_deg in (2.9, 3.1, 14.9, 15.1)] == [
@@ -455,9 +457,9 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
 def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_not_blamed() -> None:
     one = Footage().observed(0)
     misfit = Misfit(share=0.1, error_deg=3.1 / result.MEAN_OF_HELD)
-    one.facts[:] = [
+    one.facts = KeptFacts(
         replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0, moving_share=1.0) for facts in one.facts
-    ]
+    )
     (lacking,) = result.validity(one)
     assert "Move slower" in lacking.advice
     (lacking,) = result.validity(one, curve_doubted=True)
@@ -480,9 +482,9 @@ def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s
 
 def test_ambient_light_that_is_the_same_everywhere_is_called_a_black_level() -> None:
     one = Footage().observed(0)
-    one.facts[:] = [replace(facts, ambient=0.3) for facts in one.facts]
+    one.facts = KeptFacts(replace(facts, ambient=0.3) for facts in one.facts)
     for even, named in ((0.95, True), (0.5, False)):
-        one.dark_evenness[:] = [even]
+        one.dark_evenness = array("d", [even])
         assert ("black_level" in ambient(one).advice) == named
         assert ambient(one).grade == "doubtful"
 
@@ -580,7 +582,7 @@ def test_ambient_light_that_no_flash_freezes_is_said_with_its_blur_and_its_lean(
     plan = replace(plan_of(["a"], fps=1), mode="rolling")
     timing = timing_of(frame_period_s=1.0, exposure_s=0.5, row_time_s=1.0 / SIZE)
     one = Footage(shape="waves", lights=1, rounds=4, shift_px=4).observed(0)
-    one.facts[:] = [replace(facts, ambient=ambient) for facts in one.facts]
+    one.facts = KeptFacts(replace(facts, ambient=ambient) for facts in one.facts)
     found = of_motion.motion(plan, timing, one).found
     assert ("do not freeze the ambient light, 8 % of the signal" in found) == said
     speed_px_s = float(np.median([facts.speed_px_s or 0.0 for facts in one.facts[1:]]))
@@ -606,7 +608,7 @@ def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_no
     one.light_at_points.clear()
     (line,) = (each for each in rig_of(one) if "lean" in each.found)
     assert (line.grade, "nearly in a plane" in line.found) == ("doubtful", True)
-    one.facts[:] = [replace(facts, clipped_share=0.2) for facts in one.facts]
+    one.facts = KeptFacts(replace(facts, clipped_share=0.2) for facts in one.facts)
     assert not any("lean" in each.found for each in rig_of(one)), "what clips leans normals, too"
 
 
@@ -754,7 +756,7 @@ def _tiles_that_move(footage: Footage, rounds: int) -> list[list[np.ndarray]]:
 def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> None:
     one = Footage(rounds=2).observed(0)
     one.counts[one.lights[0]] = np.zeros_like(one.counts[one.lights[0]])
-    one.facts = [replace(fact, levels=(0.0, *fact.levels[1:])) for fact in one.facts]
+    one.facts = KeptFacts(replace(fact, levels=(0.0, *fact.levels[1:])) for fact in one.facts)
     assert [line.grade for line in lamps(one)] == ["good"]
 
 

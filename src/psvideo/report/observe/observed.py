@@ -4,6 +4,7 @@ Shares are counted on thinned pictures. What takes longer (sharpness, the rig's 
 rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a hundred.
 """
 
+from array import array
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -20,8 +21,9 @@ from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.observe.astray import Astray, astray
-from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, instant_facts, thinned_round
+from psvideo.report.observe.facts import FAINT, Seen, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
+from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
@@ -43,6 +45,10 @@ WEAK_BESIDE = 1 / 8
 def _evenness(image: NDArray[np.float32]) -> float:
     low, high = (quantile(image, share) for share in (0.05, 0.95))
     return float(low / max(high, FAINT))
+
+
+def _numbers() -> "array[float]":
+    return array("d")
 
 
 @dataclass(kw_only=True)
@@ -73,7 +79,7 @@ class Observed:
     first: int | None = None
     white: float | None = None
     stills: bool = False
-    facts: list[InstantFacts] = field(default_factory=list)
+    facts: KeptFacts = field(default_factory=KeptFacts)
     counts: dict[str, Counts] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
@@ -83,8 +89,8 @@ class Observed:
     astray: list[Astray] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
-    beyond_mask: list[float] = field(default_factory=list)
-    dark_evenness: list[float] = field(default_factory=list)
+    beyond_mask: "array[float]" = field(default_factory=_numbers)
+    dark_evenness: "array[float]" = field(default_factory=_numbers)
     worst: Worst = field(default_factory=Worst)
     _first: dict[str, Glimpse] = field(default_factory=dict)
     _glimpse: Glimpse | None = None
@@ -162,7 +168,7 @@ class Observed:
 
     def followed_by(self, other: "Observed") -> None:
         """Take in what was seen of the rounds after these."""
-        self.facts += other.facts
+        self.facts.extend(other.facts)
         for light, counted in other.counts.items():
             self.counts[light] = self.counts.get(light, np.zeros(BINS + 2, np.int64)) + counted
         self.blurs_px += other.blurs_px

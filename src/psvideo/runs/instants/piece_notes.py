@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from array import array
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from psvideo.model.surface import Reflectance, Subject
 from psvideo.model.timing import Timing
 from psvideo.report.observe.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -48,8 +50,8 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "in_shadow": seen.in_shadow,
         "astray": [asdict(one) for one in seen.astray],
         "ambient_measured": list(seen.ambient_measured.items()),
-        "beyond_mask": seen.beyond_mask,
-        "dark_evenness": seen.dark_evenness,
+        "beyond_mask": seen.beyond_mask.tolist(),
+        "dark_evenness": seen.dark_evenness.tolist(),
         "worst": [{"number": one.number, "badness": one.badness, "why": one.why} for one in seen.thumbnails],
         "reserved": found.reserved,
     }
@@ -122,7 +124,7 @@ def _read(path: Path) -> tuple[range, Found]:
         observed = Observed(
             lights=tuple(record["counts"]),
             first=record["first"],
-            facts=list(FACTS.validate_python(record["facts"])),
+            facts=KeptFacts(FACTS.validate_python(record["facts"])),
             counts={light: np.array(counted, np.int64) for light, counted in record["counts"].items()},
             blurs_px=record["blurs_px"],
             slopes=record["slopes"],
@@ -132,8 +134,8 @@ def _read(path: Path) -> tuple[range, Found]:
             in_shadow=record["in_shadow"],
             astray=list(ASTRAY.validate_python(record["astray"])),
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},
-            beyond_mask=record["beyond_mask"],
-            dark_evenness=record["dark_evenness"],
+            beyond_mask=array("d", record["beyond_mask"]),
+            dark_evenness=array("d", record["dark_evenness"]),
             worst=Worst(
                 Thumbnail(**one, normals=arrays[f"normals{n}"], valid=arrays[f"valid{n}"])
                 for n, one in enumerate(record["worst"])
