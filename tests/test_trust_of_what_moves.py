@@ -106,3 +106,44 @@ def test_a_sheet_in_waves_is_trusted_as_without_alignment_and_its_normals_are_be
     (right, off_deg), (plain_right, plain_deg) = shown(Aligning()), shown(UNALIGNED)
     assert right > 0.95 * plain_right
     assert off_deg < 0.5 * plain_deg
+
+
+TURNING_RAD_S, BOARD = 5.7, (slice(30, 98), slice(40, 120))
+FIVE = np.array([[0, 0.6, 0.8], [-0.5706, 0.1854, 0.8], [-0.3527, -0.4854, 0.8], [0.3527, -0.4854, 0.8], [0, 0, 1.0]])
+
+
+def turning(time_s: float, shape: tuple[int, int] = (128, 160)) -> np.ndarray:
+    """The normals of a wall, and of a board before it that turns to the left about its own vertical."""
+    angle = np.deg2rad(60) - TURNING_RAD_S * time_s
+    normals = np.broadcast_to([0.0, 0.0, 1.0], (*shape, 3)).copy()
+    normals[BOARD] = [-np.sin(angle), -0.3, np.cos(angle)]
+    return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True), np.float64)
+
+
+def test_a_bare_board_that_turns_out_of_a_lamps_shadow_is_as_bright_under_it_as_a_blend() -> None:
+    """Before the instant the fourth lamp does not reach it, and the later plate is too bright by a fifth."""
+    names, rng, plates = tuple("abcde"), np.random.default_rng(5), []
+    albedo = np.full((128, 160), 0.6)
+    albedo *= 1 + 0.3 * np.sin(np.arange(160) / 2) * np.sin(np.arange(128) / 3)[:, None]
+    albedo[BOARD] = 0.6
+    for number in (1, 2, 3):
+        for n, (name, direction) in enumerate(zip(names, FIVE, strict=True)):
+            time_s = (6 * (number - 2) + n - 2) * PITCH_S
+            light = 0.9 * albedo * np.maximum(turning(time_s) @ direction, 0)
+            picture = made(np.asarray(light + rng.normal(0, NOISE, light.shape), np.float32))
+            seen = np.ones(len(light), np.bool_)
+            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))
+    lit = Illumination(directions=FIVE, intensities=np.full((5, 1), 0.9), names=names)
+
+    def shown(how: Aligning) -> tuple[float, float]:
+        one = list(aligned(plates, names, how, first=1))[1]
+        moves = None if one.motion is None else one.motion.moves
+        surface = Solving(error=True).solve([p.image for p in one.plates], lit, unsure=one.unsure, moves=moves)
+        off_deg = angles_deg(surface.normals, turning(0.0))
+        return float(one.plates[3].image[BOARD].mean()), float(off_deg[BOARD].mean())
+
+    true = 0.54 * float(turning(0.0)[BOARD][0, 0] @ FIVE[3])
+    (light, off_deg), (nearest, plain_deg) = shown(Aligning()), shown(UNALIGNED)
+    assert nearest > 1.2 * true
+    assert true < light < true + 0.5 * (nearest - true)
+    assert off_deg < 0.4 * plain_deg

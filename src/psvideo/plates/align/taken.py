@@ -38,7 +38,8 @@ BLENDED, BLENDED_UNLIKE, BLENDED_ALIKE = np.float32(0.25), np.float32(0.8), np.f
 would be; by what their detail differs, by a shadow, or by more than is even, only a little less, and half where plates
 are alike: edges lie a part of a pixel beside each other there."""
 REST = 3.0
-"""What stands still while its shading changes by more codes is blended by time."""
+"""What stands still while its shading changes by more codes is blended by time, and where one of the two plates is in
+shadow as well: a face that turns to a lamp is as bright as the blend or darker, and darker than the later plate."""
 ENOUGH = 4
 """Where this many lights are sure, other lights are left out unless they are sure as well."""
 MANY = 4
@@ -80,11 +81,12 @@ def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
     unlike = np.asarray(cv2.blur((apart - shading) ** 2, narrow), np.float32)
     own_shading, own_unlike = evenly_changed(apart, (shading, unlike), each, BARE)
     shaded = _shaded(before, after, wide)
-    alike, own_alike = (_alike(*two) & ~shaded for two in ((shading, unlike), (own_shading, own_unlike)))
+    evenly, own_evenly = (_alike(*two) for two in ((shading, unlike), (own_shading, own_unlike)))
+    alike, own_alike = evenly & ~shaded, own_evenly & ~shaded
     nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
     source = np.where(motion.moves, np.where(own_unlike < np.float32(TURNED**2), BOTH, nearer), AT_REST)
     source = source.astype(np.uint8)
-    source[~motion.moves & alike & (np.abs(shading) > REST)] = BOTH
+    source[~motion.moves & evenly & (np.abs(shading) > REST)] = BOTH
     if guessed:
         source[~motion.moves & (np.abs(apart) > REST)] = BOTH
     gone = [_outside(way) for way in ways]
