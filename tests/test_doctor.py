@@ -7,11 +7,14 @@ import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
+import numba
 import pytest
+from numba.core import caching
 from packaging.requirements import Requirement
 
 from psvideo.cli.app import main
 from psvideo.clip.decode import decoders
+from psvideo.compute.compiled import folder_kept_in
 from psvideo.inspect import speed
 from psvideo.inspect.findings import Finding, is_well
 
@@ -52,6 +55,19 @@ def test_what_lacks_is_missing_with_the_next_step_and_exit_status_1(
     assert lacking == {"movies: ProRes", "scipy"}
     assert found["usd-core"]["level"] == "note", "an extra is no fault"
     assert all(finding["next_step"] for finding in found.values() if finding["level"] != "ok")
+
+
+def test_where_compiled_loops_cannot_be_kept_it_says_what_to_set(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
+    _, found, well = asked(capsys)
+    assert well, "slow, and no fault"
+    assert found["numba's compiler"]["level"] == "note"
+    assert "NUMBA_CACHE_DIR" in str(found["numba's compiler"]["next_step"])
+    monkeypatch.undo()
+    monkeypatch.setattr(numba.core.config, "CACHE_DIR", str(tmp_path / "kept"))
+    assert folder_kept_in() == next((tmp_path / "kept").iterdir())
 
 
 def test_every_extra_that_users_may_install_is_reported_with_the_line_to_type(

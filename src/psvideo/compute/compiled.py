@@ -163,6 +163,13 @@ REORDERED = Arithmetic(FUSED.fastmath | {"reassoc"})
 """Sums may change their order too, always to the same one."""
 
 
+def folder_kept_in() -> Path | None:
+    """Return a folder in which code that is compiled now is kept, that of this module; None where none can be written
+    and every run compiles again what installing did not keep."""
+    place = _AnyPlace(sources_digest).locator
+    return None if isinstance(place, _ReadOnly) else Path(place.get_cache_path())
+
+
 def sources_digest(module: ModuleType) -> str:
     """Return a digest of a module's source and of the modules of its package that compiled code in it is made of.
 

@@ -70,6 +70,12 @@ def _compiler() -> Finding:
     if config.DISABLE_JIT:
         step = "Unset NUMBA_DISABLE_JIT: without compiling everything is a hundred times slower."
         return Finding(name="numba's compiler", level="missing", text="switched off", next_step=step)
+    from psvideo.compute.compiled import folder_kept_in  # which needs numba
+
+    if folder_kept_in() is None:
+        text = "compiles for this processor, and can keep nothing: what installing did not compile, every run does"
+        step = "Set NUMBA_CACHE_DIR to a folder that can be written; psvideo's own and your home cannot."
+        return Finding(name="numba's compiler", level="note", text=text, next_step=step)
     text = "compiles for this processor; rows are shared out over psvideo's own threads, not numba's"
     return Finding(name="numba's compiler", level="ok", text=text)
 
