@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -16,12 +17,14 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.errors import UsageError
 from psvideo.live.chain import NewestRound
+from psvideo.live.showing import newest_pictures
 from psvideo.live.showing.newest_pictures import NewestPictures, lit_rows
 from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.live.showing.smaller import smaller_plan
-from psvideo.live.watching import ENOUGH, Watching, told
+from psvideo.live.watching import ENOUGH, LOOK_S, STARVED, Watching, told
 from psvideo.model.camera import Camera
 from psvideo.model.timing import timed_camera
+from psvideo.page.picture import PagePicture
 from psvideo.runs.live import live
 
 if TYPE_CHECKING:
@@ -99,19 +102,58 @@ def test_a_viewer_gets_the_newest_and_not_what_came_between(served: Served) -> N
 
 def test_what_a_round_shows_is_looked_at_little_by_little_and_comes_to_the_same(served: Served) -> None:
     results, plan = served[2], ps.open_take(served[4]).plan
-    at_once, by_steps = Watching(plan=plan), Watching(plan=plan, most_s=0.0)
+    at_once, by_steps = Watching(plan=plan), Watching(plan=plan)
     for newest in (*results, *results):
         at_once.look(newest, plan)
     steps = 0
     for newest in (*results, *results):
-        by_steps.look(newest, plan)
+        by_steps.look(newest, plan, until_s=0.0)
         while by_steps.busy:
             steps += 1
-            by_steps.look(results[-1], plan)  # which is newer, and not looked at before the other is done
-    assert steps > 3 * ENOUGH
+            by_steps.look(results[-1], plan, until_s=0.0)  # which is newer, and not looked at before the other is done
+    assert steps > 3 * ENOUGH * (1 + STARVED), "there was never time: each step waits for that many results"
     assert by_steps.lines == at_once.lines
     assert by_steps.histograms == at_once.histograms
     assert by_steps.powers == at_once.powers
+
+
+def test_a_round_is_looked_at_where_there_is_time_for_what_a_step_took(served: Served) -> None:
+    results, plan = served[2], ps.open_take(served[4]).plan
+    watching = Watching(plan=plan)
+    watching.look(results[0], plan)
+    assert not watching.busy, "there is no hurry"
+    later = next(one for one in results if one.round.time_s - results[0].round.time_s > LOOK_S)
+    watching.look(later, plan, until_s=time.monotonic() + 60)
+    assert not watching.busy, "a minute is enough for all steps"
+    watching._took_s = dict.fromkeys(watching._took_s, 60.0)
+    watching.look(results[0], plan, until_s=time.monotonic() + 30)
+    assert watching._place == 0, "half a minute is too little for a step that took one"
+    assert watching.busy
+
+
+def test_what_viewers_asked_for_is_packed_before_the_next_result_is_shown(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results, camera = served[2], served[3]
+    pictures, packed = NewestPictures(), list[str]()
+
+    def block(picture: PagePicture) -> bytes:
+        packed.append(str(picture.facts["id"]))
+        return b""
+
+    monkeypatch.setattr(newest_pictures, "picture_block", block)
+    pictures.put(results[0], camera)
+    assert not packed, "nobody looks"
+    pictures.packed("left")
+    whole = ["normals", "albedo", "plate", "frame"]
+    assert packed == whole
+    pictures.put(results[1], camera)
+    assert packed == 2 * whole
+    assert pictures.packed("left")[0] == 2
+    assert packed == 2 * whole, "the viewer waits for nothing"
+    pictures.put(results[2], camera)
+    pictures.put(results[3], camera)
+    assert packed == 3 * whole, "a viewer who is slower than results is not packed for twice"
 
 
 def test_two_viewers_and_one_that_comes_and_goes(served: Served) -> None:

@@ -33,7 +33,7 @@ from psvideo.solve.normals.solving import Solving
 GRID_PX = 240
 """What is trusted of a picture that is gone in a moment is told by half as many points a side as of one that stays."""
 LOOKED_AGAIN = 32
-"""What the subject reflects beyond n . l is found again after so many rounds: finding it takes 30 to 60 ms."""
+"""What the subject reflects beyond n . l is found again after so many rounds: finding it takes a few ms."""
 Search = Callable[[Callable[[], None]], None]
 """Runs a search: now, or beside what else goes on."""
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from math import inf
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from psvideo.live.incoming.source import LiveSource
 from psvideo.live.keeping_up import KeepingUp
 from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.result_times import STATUS_S, ResultTimes
-from psvideo.live.showing.quality import MOST_RATE, Quality
+from psvideo.live.rhythm import Rhythm
+from psvideo.live.showing.quality import Quality
 from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveState, LiveStatus, LiveSummary
 from psvideo.live.waiting import Waiting
@@ -32,6 +34,7 @@ LEAVES_S = 5.0
 """Whoever reads a source that is silent hears only with its next frame that the run is over, and is waited for so long.
 """
 Shown = Callable[[NewestRound], None]
+Meanwhile = Callable[[NewestRound, float], None]
 Said = Callable[[LiveStatus], None]
 
 
@@ -43,6 +46,7 @@ def search_beside(run: Callable[[], None]) -> None:
 @dataclass(kw_only=True)
 class Running:
     """One live run. ``shown`` gets every new result, ``said`` a status each second, ``recording`` every frame.
+    ``meanwhile`` gets it after that, and until when (on the monotonic clock) there is time before the next one.
 
     ``prepare`` is done before the source is opened, where frames do not wait for it.
     ``drawn_ages_s`` says how old results were when pages had drawn them since a time; ``status`` is the last one that
@@ -53,6 +57,7 @@ class Running:
     quality: Quality
     shown: Shown
     said: Said
+    meanwhile: Meanwhile = lambda newest, until_s: None
     prepare: Callable[[], None] = lambda: None
     drawn_ages_s: Callable[[float], list[float]] = lambda since_s: []
     recording: Recording | None = None
@@ -100,7 +105,9 @@ class Running:
         self.chain.search = search_here
         for frame in self.source.frames():
             self._take(frame)
-            self._solve()
+            newest = self._solve()
+            if newest is not None:
+                self.meanwhile(newest, inf)
             if self._stop.is_set() or self._over(frame.index):
                 break
         self.said(self._status(time.monotonic() - began_s, 1.0, (0, 0)))
@@ -149,15 +156,21 @@ class Running:
                 break
 
     def _make(self) -> None:
-        """Solve when a frame has come, and no more often than looks like motion: other time is the frames'."""
-        due_s = 0.0
+        """Solve when a frame has come and a result is due, and see to all else while none is."""
+        plan = self.chain.plan
+        rhythm = Rhythm(round_s=plan.cycle_s / len(plan.dark_rounds), frame_s=plan.camera.frame_period_s)
         while not self._stop.is_set():
-            if not self._came.wait(IDLE_S) or self._stop.wait(max(due_s - time.monotonic(), 0.0)):
+            if not self._came.wait(IDLE_S):
+                continue
+            now_s = time.monotonic()
+            if self._stop.wait(max(rhythm.due_s(now_s) - now_s, 0.0)):
                 continue
             self._came.clear()
             began_s = time.monotonic()
-            if self._solve():
-                due_s = began_s + 1 / MOST_RATE
+            newest = self._solve()
+            if newest is not None:
+                rhythm = rhythm.after(began_s=began_s, came_s=newest.came_s)
+                self.meanwhile(newest, rhythm.idle_until_s(time.monotonic()))
 
     def _take(self, frame: LiveFrame) -> None:
         self._behind = self._behind or Behind(period_s=self.chain.plan.camera.frame_period_s)
@@ -171,15 +184,15 @@ class Running:
         if self.first_lock_s is None and self.chain.follower is not None:
             self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
 
-    def _solve(self) -> bool:
+    def _solve(self) -> NewestRound | None:
         began_s = time.monotonic()
         with self.times.making(began_s):
             newest = self.chain.solve()
             if newest is None:
-                return False
+                return None
             self.shown(newest)
         self.times.add(came_s=newest.came_s, began_s=began_s)
-        return True
+        return newest
 
     def _over(self, index: int) -> bool:
         return self.seconds is not None and (index + 1) * self.chain.plan.camera.frame_period_s >= self.seconds

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +24,8 @@ LOOK_S = 0.4
 """So far apart are rounds that are looked at, in the footage's time: to look costs as much as to solve."""
 ENOUGH = 4
 """Rounds by which the lines are made."""
-MOST_S = 0.006
-"""After each result it is looked for this long, and a step beyond: what is left waits for the one after, and no picture
-for it."""
+STARVED = 2
+"""Results after which there was no time for a step; with the next one it is done all the same, and a picture waits."""
 HISTOGRAM = 64
 THINNED = 2
 """Histograms count every second row and column."""
@@ -34,12 +34,12 @@ THINNED = 2
 @dataclass(kw_only=True)
 class Watching:
     """Looks at some of the rounds; ``lines`` are the judgements of the last few, ``histograms`` each light's counts,
-    ``powers`` what to set each light's power to. ``most_s``: for how long at a time, of this machine's."""
+    ``powers`` what to set each light's power to. A round is looked at in steps, and ``_took_s`` (by step) is what each
+    cost."""
 
     plan: Plan
     rig: Rig | None = None
     spell: Callable[[str], str] = str
-    most_s: float = float("inf")
     lines: tuple[Judgement, ...] = ()
     histograms: dict[str, list[int]] = field(default_factory=dict)
     powers: dict[str, str] = field(default_factory=dict)
@@ -47,24 +47,37 @@ class Watching:
     _step: int = 0
     _looked_s: float = float("-inf")
     _looking: Iterator[None] | None = None
+    _place: int = 0
+    _took_s: dict[int, float] = field(default_factory=dict)
+    _passed: int = 0
 
     @property
     def busy(self) -> bool:
         """Whether a round is being looked at, for which there was no time yet."""
         return self._looking is not None
 
-    def look(self, newest: NewestRound, plan: Plan) -> None:
-        """Go on with the round that is being looked at; or begin with this one, of a picture of the plan's size."""
-        until_s = time.monotonic() + self.most_s
+    def look(self, newest: NewestRound, plan: Plan, *, until_s: float = inf) -> None:
+        """Go on with the round that is being looked at; or begin with this one, of a picture of the plan's size.
+
+        A step is taken where it will be over at ``until_s``, on the monotonic clock, by what it took before.
+        """
         if self._looking is None:
             if abs(newest.round.time_s - self._looked_s) < LOOK_S:
                 return
             self._looked_s = newest.round.time_s
-            self._looking = self._steps(newest, plan)
-        for _ in self._looking:
-            if time.monotonic() > until_s:
+            self._looking, self._place = self._steps(newest, plan), 0
+        while self._looking is not None:
+            began_s, took_s = time.monotonic(), self._took_s.get(self._place, 0.0)
+            if began_s + took_s > until_s and self._passed < STARVED:
+                self._passed += 1
                 return
-        self._looking = None
+            self._passed = 0
+            for _ in self._looking:
+                break
+            else:
+                self._looking = None
+            self._took_s[self._place] = max(time.monotonic() - began_s, 0.5 * took_s)
+            self._place += 1
 
     def _steps(self, newest: NewestRound, plan: Plan) -> Iterator[None]:
         """Look at a round, and judge once there are enough."""

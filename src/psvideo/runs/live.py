@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
-from math import inf
 from pathlib import Path
 
 from psvideo.errors import NoStrobeError
@@ -25,7 +24,7 @@ from psvideo.live.showing.page_server import live_page
 from psvideo.live.showing.quality import first_quality
 from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveStatus, LiveSummary
-from psvideo.live.watching import MOST_S, Watching, told
+from psvideo.live.watching import Watching, told
 from psvideo.model.choices import Pace
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.rig import Rig
@@ -174,8 +173,7 @@ def _page(
 ) -> Iterator[None]:
     """Serve the live page while the block runs: every result is put there, and some are judged."""
     plan = source.plan
-    most_s = MOST_S if source.paced else inf  # where frames wait for results, how quick a machine is tells nothing
-    watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell, most_s=most_s), NewestPictures()
+    watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell), NewestPictures()
     shown = running.shown
 
     def use(found: Rig) -> str:
@@ -188,10 +186,13 @@ def _page(
     def show(newest: NewestRound) -> None:
         small = smaller_plan(plan, newest.step)
         pictures.put(newest, timed_camera(small, newest.timing))
-        watching.look(newest, small)
         ball.look(newest)
         shown(newest)
 
+    def judge(newest: NewestRound, until_s: float) -> None:
+        watching.look(newest, smaller_plan(plan, newest.step), until_s=until_s)
+
+    running.meanwhile = judge
     running.shown, running.drawn_ages_s = show, pictures.drawn_ages_s
 
     def say() -> dict[str, object]:

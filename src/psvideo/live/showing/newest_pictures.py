@@ -1,4 +1,7 @@
-"""The newest pictures for pages: packed when somebody asks for them, once for all who do, and never an older one."""
+"""The newest pictures for pages: packed once for all who ask for them, and never an older one.
+
+What was asked for of the one before is packed before the new one is shown: two threads in turn take longer.
+"""
 
 import threading
 from collections import deque
@@ -32,6 +35,7 @@ class NewestPictures:
     _newest: NewestRound | None = None
     _camera: Camera | None = None
     _packed: dict[str, bytes] = field(default_factory=dict)
+    _asked: set[str] = field(default_factory=set)
     _came_s: dict[int, float] = field(default_factory=dict)
     _drawn: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
     _changed: threading.Condition = field(default_factory=threading.Condition)
@@ -39,7 +43,13 @@ class NewestPictures:
     def put(self, newest: NewestRound, camera: Camera) -> None:
         """Take the place of what was newest; ``camera`` is that of the small frames."""
         with self._changed:
-            self._newest, self._camera, self._packed = newest, camera, {}
+            asked, self._asked = self._asked, set()
+        packed = {
+            name: picture_block(_picture(name, newest, camera))
+            for name in dict.fromkeys(name for plate in sorted(asked) for name in _names(newest, plate))
+        }
+        with self._changed:
+            self._newest, self._camera, self._packed = newest, camera, packed
             self.number += 1
             self._came_s[self.number] = newest.came_s
             self._came_s.pop(self.number - REMEMBERED, None)
@@ -66,13 +76,19 @@ class NewestPictures:
         """Return the newest number and its pictures as blocks: normals and albedo, one light's plate, the frame."""
         with self._changed:
             newest, camera, number, kept = self._newest, self._camera, self.number, self._packed
+            self._asked.add(plate)
         if newest is None or camera is None:
             return number, []
-        names = ["normals", "albedo"] if newest.surface is not None else []
         return number, [
             kept[name] if name in kept else kept.setdefault(name, picture_block(_picture(name, newest, camera)))
-            for name in (*names, f"plate {plate}", "frame")
+            for name in _names(newest, plate)
         ]
+
+
+def _names(newest: NewestRound, plate: str) -> list[str]:
+    """Return the names of the pictures that whoever looks at a light's plate gets."""
+    surface = ["normals", "albedo"] if newest.surface is not None else []
+    return [*surface, f"plate {plate}", "frame"]
 
 
 def _picture(name: str, newest: NewestRound, camera: Camera) -> PagePicture:
