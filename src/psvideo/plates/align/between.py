@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.channels import brightest_channel
 from psvideo.model.coded import Image
+from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, blend_rows
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed
-from psvideo.plates.align.velocity.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
+from psvideo.plates.align.velocity.moving_kernel import AT_REST
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import Reader, made
 
@@ -26,10 +27,8 @@ HALF = np.float32(0.5)
 BAND_ROWS = 64
 MARGIN_ROWS = 5
 """Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
-BESIDE_CLIPPED, OVERSHOOT, JUST_BELOW = 5, 1.45, 1 - 1e-4
-"""Cubic interpolation mixes samples of a square this wide; its result may reach this many times the brightest of them
-(the sum of its positive weights). Clipped samples are kept out of it, and its result is kept below the level that
-counts as clipped, also after rounding to 16 bits."""
+BESIDE_CLIPPED = 5
+"""Cubic interpolation mixes samples of a square this wide: clipped ones are kept out of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +73,10 @@ def plate_at(
     image = np.empty(own.shape, np.float32)
     seen = np.empty((rows, cols), np.bool_)
 
+    sources, columns = (source, source if guess is None else guess), columns_in(cols, source.shape[1])
+
     def fill(top: int, bottom: int) -> None:
-        _fill(range(top, bottom), image, seen, own, sides, (source, source if guess is None else guess), motion)
+        _fill(range(top, bottom), image, seen, own, sides, sources, motion, columns)
 
     over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
@@ -92,13 +93,13 @@ def plate_at(
 @dataclass(frozen=True, kw_only=True)
 class _Side:
     """A plate, of whose picture only those rows are made that move into a band, what it counts where both plates are
-    taken, and what lies well within what was seen, by rows, (row, 1), or by pixels; None where that is everywhere."""
+    taken, and what lies well within what was seen, by rows, (row, 1), or by pixels; (1, 1) where that is everywhere."""
 
     plate: LightPlate
     read: Reader
     span_s: float
     weight: np.float32
-    within: Flags | None
+    within: Flags
 
     @classmethod
     def of(cls, plate: LightPlate, motion: Followed, weight: float) -> "_Side":
@@ -109,7 +110,7 @@ class _Side:
             read=plate.picture.reader(),
             span_s=motion.time_s - plate.time_s,
             weight=np.float32(weight),
-            within=None if within.all() else within,
+            within=np.ones((1, 1), np.bool_) if within.all() else within,
         )
 
     def around(self, band: range, velocity: Vectors) -> "_Rows":
@@ -121,13 +122,6 @@ class _Side:
         last = min(math.ceil(band.stop - ways.min()) + MARGIN_ROWS, rows)
         first, last = min(first, band.start), max(last, band.stop)
         return _Rows(side=self, first=first, light=self.read(first, last))
-
-    def weights(self, x: Vectors, y: Vectors) -> Vectors:
-        """Return what the plate counts at places of its own, or, (1, 1), at all: 0 where it was not seen."""
-        if self.within is None:
-            return np.full((1, 1), self.weight)
-        row, col = _nearest((y, x), self.within.shape)
-        return self.within[row, col] * self.weight
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,30 +135,14 @@ class _Rows:
     def of(self, band: range) -> Image:
         return self.light[band.start - self.first : band.stop - self.first]
 
-    def moved(self, x: Vectors, y: Vectors) -> Image:
-        """Return the plate at places of its own. What clips is what does at the nearest sample: beside clipped ones
-        that is taken as it is, for it cannot be told how bright they are, and what is between is not clipped for it."""
-        light, full, y_shown = self.light, self.side.plate.saturation, y - np.float32(self.first)
-        image = np.asarray(cv2.remap(light, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), np.float32)
-        brightest = light.max()
-        if brightest > full / OVERSHOOT:
-            np.minimum(image, np.float32(full * JUST_BELOW), out=image)
-        if brightest >= full:
-            clipped = (brightest_channel(light) >= full).astype(np.uint8)
-            wider = cv2.dilate(clipped, np.ones((BESIDE_CLIPPED, BESIDE_CLIPPED), np.uint8))
-            row, col = _nearest((y_shown, x), clipped.shape)
-            beside = wider[row, col] > 0
-            row, col = row[beside], col[beside]
-            samples = light[row, col]
-            samples[clipped[row, col] > 0] = full
-            image[beside] = samples
-        return image
-
-
-def _nearest(places: tuple[Vectors, Vectors], shape: tuple[int, ...]) -> list[NDArray[np.intp]]:
-    """Return the row and the column of the nearest pixel within a picture."""
-    each = zip(places, shape, strict=True)
-    return [np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in each]
+    def marks(self) -> Codes:
+        """Return what is clipped and what lies beside that, (row, col), or one 0 where nothing is."""
+        light, full = self.light, self.side.plate.saturation
+        if light.max() < full:
+            return np.zeros((1, 1), np.uint8)
+        clipped = (brightest_channel(light) >= full).astype(np.uint8)
+        wider = cv2.dilate(clipped, np.ones((BESIDE_CLIPPED, BESIDE_CLIPPED), np.uint8))
+        return np.where(clipped, np.uint8(CLIPPED), np.uint8(BESIDE) * wider)
 
 
 def _fill(
@@ -175,6 +153,7 @@ def _fill(
     sides: Sequence[_Side | None],
     sources: tuple[Codes, Codes],
     motion: Followed,
+    columns: tuple[NDArray[np.uintp], Vectors],
 ) -> None:
     """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
     some, part = slice(band.start, band.stop), _part(sources, band, image.shape)
@@ -182,28 +161,46 @@ def _fill(
     if not part:
         image[some] = own.picture.rows(band)
         return
-    size = len(band), len(part)
-    given, taken = np.empty((2, *size), np.uint8)
-    ways = np.empty((2, 2, *size), np.float32)
-    spans_s = np.array([0 if side is None else side.span_s for side in sides], np.float32)
-    ways_rows(*sources, motion.velocity, spans_s, image.shape[:2], band.start, part.start, given, taken, ways)
-    moved = [np.zeros((*size, *image.shape[2:]), np.float32)] * len(sides)
-    weights = [np.zeros((1, 1), np.float32)] * len(sides)
-    for number, (side, way) in enumerate(zip(sides, ways, strict=True)):
-        if side is not None:
-            rows = side.around(band, motion.velocity)
-            if side.plate is own:
-                image[some] = rows.of(band)
-            moved[number], weights[number] = rows.moved(*way), side.weights(*way)
-    flowing = (taken != AT_REST) & (taken != NOWHERE)
-    known = seen[some, part.start : part.stop]
-    known[:] = np.where(flowing, own.rows_seen[some, None], known) & (given != NOWHERE)
-    full = [*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation]
-    one, other, blended = (picture.reshape(*picture.shape[:2], -1) for picture in (*moved, image[some]))
+    rows = [None if side is None else side.around(band, motion.velocity) for side in sides]
+    stays = next(one for one in rows if one is not None and one.side.plate is own).of(band)
+    for beside in (slice(0, part.start), slice(part.stop, None)):
+        image[some, beside] = stays[:, beside]
+    none, nothing = np.zeros((1, 1, _channels(image)), np.float32), np.zeros((1, 1), np.uint8)
+    before, after = (none if one is None else _flat(one.light) for one in rows)
+    marks_before, marks_after = (nothing if one is None else one.marks() for one in rows)
+    seen_before, seen_after = (nothing > 0 if side is None else side.within for side in sides)
+    places, shares = columns
     blend_rows(
-        taken, np.array(np.broadcast_arrays(*weights)), one, other, np.array(full, np.float32),
-        np.ascontiguousarray(own.rows_seen[some]), part.start, blended, seen[some],
+        *sources, motion.velocity, np.array([0 if side is None else side.span_s for side in sides], np.float32),
+        image.shape[:2], band.start, part.start, part.stop,
+        places, shares, np.empty((2, sources[0].shape[1] + 1), np.float32),
+        before, after, np.array([0 if one is None else one.first for one in rows], np.intp),
+        marks_before, marks_after, seen_before, seen_after,
+        np.array([0 if side is None else side.weight for side in sides], np.float32),
+        np.array([*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32),
+        np.ascontiguousarray(own.rows_seen[some]), _flat(stays), _flat(image[some]), seen[some],
     )  # fmt: skip
+
+
+def columns_in(cols: int, coarse: int) -> tuple[NDArray[np.uintp], Vectors]:
+    """Return for every column of a picture the coarse ones before it and in which it lies, (2, col), and how far it
+    lies beyond the middle of the former."""
+    place = (np.arange(cols, dtype=np.float32) + HALF) * np.float32(coarse / cols)
+    at = np.clip(place - HALF, 0, coarse - 1)
+    before = np.floor(at)
+    return np.stack([before, np.minimum(place, coarse - 1)]).astype(np.uintp), at - before
+
+
+def _channels(image: Image) -> int:
+    channels = 1 if image.ndim == 2 else image.shape[2]
+    if channels not in (1, 3):
+        raise ValueError(f"plates have one channel or three, and not {channels}")
+    return channels
+
+
+def _flat(image: Image) -> Image:
+    """Return a picture with an axis of channels."""
+    return image.reshape(*image.shape[:2], _channels(image))
 
 
 def _part(sources: tuple[Codes, Codes], band: range, shape: tuple[int, ...]) -> range:

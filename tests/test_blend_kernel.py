@@ -1,0 +1,104 @@
+"""Plates between two others in one compiled pass, against the same by single pixels in plain Python."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.plates.align.between import columns_in
+from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, JUST_BELOW, blend_rows
+from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
+
+ROWS, COLS = 22, 31
+COARSE = 11, 16
+FIRST, BAND, LEFT, RIGHT = 6, 8, 2, 29
+SPANS_S, COUNTS, FULL = (0.4, -0.6), (0.6, 0.4), (0.9, 0.95, 1.0)
+Array = NDArray[np.float64]
+
+
+def _weight(away: float) -> float:
+    """Keys' weight of a sample so far away, by its two pieces, with a slope of -0.75."""
+    away, slope = abs(away), -0.75
+    if away <= 1:
+        return (slope + 2) * away**3 - (slope + 3) * away**2 + 1
+    return slope * (away**3 - 5 * away**2 + 8 * away - 4) if away < 2 else 0.0
+
+
+def _within(place: int, count: int) -> int:
+    return min(max(place, 0), count - 1)
+
+
+def _interpolated(light: Array, x: float, y: float) -> Array:
+    total = np.zeros(light.shape[2])
+    for row in range(math.floor(y) - 1, math.floor(y) + 3):
+        for col in range(math.floor(x) - 1, math.floor(x) + 3):
+            sample = light[_within(row, len(light)), _within(col, light.shape[1])]
+            total += _weight(y - row) * _weight(x - col) * sample
+    return total
+
+
+def _linear(plane: Array, x: float, y: float) -> float:
+    x, y = min(max(x, 0), plane.shape[1] - 1), min(max(y, 0), plane.shape[0] - 1)
+    near = [(row, col) for row in (math.floor(y), math.ceil(y)) for col in (math.floor(x), math.ceil(x))]
+    shares = {place: (1 - abs(place[0] - y)) * (1 - abs(place[1] - x)) for place in near}
+    return float(sum(share * plane[place] for place, share in shares.items()))
+
+
+def _shown(light: Array, marks: NDArray[np.uint8], full: float, x: float, y: float) -> Array:
+    row, col = _within(round(y), len(light)), _within(round(x), light.shape[1])
+    mark = marks[row, col] if marks.size > 1 else 0
+    if mark == CLIPPED:
+        return np.full(light.shape[2], full)
+    return light[row, col] if mark == BESIDE else np.minimum(_interpolated(light, x, y), full * JUST_BELOW)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("clips", [False, True])
+@pytest.mark.parametrize("all_seen", [False, True])
+def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_seen: bool) -> None:
+    rng = np.random.default_rng(8)
+    source, guess = rng.integers(0, 5, (2, *COARSE)).astype(np.uint8)
+    velocity = rng.uniform(-12, 12, (2, *COARSE)).astype(np.float32)
+    lights = rng.uniform(0, 0.8, (2, ROWS, COLS, channels)).astype(np.float32)
+    marks = [rng.choice([0, BESIDE, CLIPPED], (ROWS, COLS)).astype(np.uint8) for _ in lights]
+    marks = marks if clips else [np.zeros((1, 1), np.uint8)] * 2
+    seen_in = [np.ones((1, 1), np.bool_), rng.random((ROWS, 1)) < 0.8]
+    seen_in = seen_in[:1] * 2 if all_seen else [rng.random((ROWS, COLS)) < 0.8, seen_in[1]]
+    rows_seen, stays = rng.random(BAND) < 0.8, rng.uniform(0, 0.8, (BAND, COLS, channels)).astype(np.float32)
+    image, seen = np.full(stays.shape, -1, np.float32), rng.random((BAND, COLS)) < 0.9
+    seen_before = seen.copy()
+    blend_rows(
+        source, guess, velocity, np.array(SPANS_S, np.float32), (ROWS, COLS), FIRST, LEFT, RIGHT,
+        *columns_in(COLS, COARSE[1]), np.empty((2, COARSE[1] + 1), np.float32), lights[0], lights[1], np.array([0, 0]),
+        marks[0], marks[1], seen_in[0], seen_in[1], np.array(COUNTS, np.float32), np.array(FULL, np.float32),
+        rows_seen, stays, image, seen,
+    )  # fmt: skip
+    assert (image[:, :LEFT] == -1).all()
+    assert (image[:, RIGHT:] == -1).all()
+    high, wide = ROWS / COARSE[0], COLS / COARSE[1]
+    for row in range(BAND):
+        for col in range(LEFT, RIGHT):
+            coarse_y, coarse_x = (FIRST + row + 0.5) / high, (col + 0.5) / wide
+            what, given = (codes[int(coarse_y), int(coarse_x)] for codes in (guess, source))
+            go_x, go_y = (_linear(plane, coarse_x - 0.5, coarse_y - 0.5) for plane in velocity.astype(np.float64))
+            counted, known, expected = {}, bool(seen_before[row, col]), stays[row, col].astype(np.float64)
+            for n, other in enumerate((AFTER, BEFORE)):
+                x, y = col - SPANS_S[n] * go_x * wide, FIRST + row - SPANS_S[n] * go_y * high
+                there = seen_in[n][_within(round(y), len(seen_in[n])), _within(round(x), seen_in[n].shape[1])]
+                if what not in (other, AT_REST, NOWHERE) and rows_seen[row] and there:
+                    counted[n] = _shown(lights[n].astype(np.float64), marks[n], FULL[n], x, y)
+            clipped = {n: bool((light >= np.float32(FULL[n])).any()) for n, light in counted.items()}
+            if len(counted) == 2 and clipped[0] != clipped[1]:
+                counted.pop(1 if COUNTS[0] >= COUNTS[1] else 0)
+            if counted:
+                total = sum(COUNTS[n] for n in counted)
+                expected = np.sum([COUNTS[n] * light / total for n, light in counted.items()], axis=0)
+                known = True
+                if any(clipped[n] for n in counted):
+                    expected = np.full(channels, FULL[2])
+            elif what != AT_REST:
+                known = False
+            np.testing.assert_allclose(image[row, col], expected, atol=3e-5, err_msg=f"{row}, {col}, {what}")
+            assert bool(seen[row, col]) == (known and given != NOWHERE), (row, col, what, given)
+    assert {AT_REST, BEFORE, AFTER, BOTH, NOWHERE} == {*np.unique(guess)}
