@@ -154,7 +154,7 @@ def blend_rows(
             small_col = owns[col]
             what = other[small_row, small_col]
             flowing = what != AT_REST and what != NOWHERE
-            known[row, col] = (rows_known[row] if flowing else known[row, col]) and own[small_row, small_col] != NOWHERE
+            known[row, col] = (flowing or known[row, col]) and own[small_row, small_col] != NOWHERE
             early, late = ZERO, ZERO
             if flowing and rows_known[row]:
                 begin, share = lefts[col], beyond[col]
