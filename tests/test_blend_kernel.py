@@ -1,4 +1,4 @@
-"""Plates between two others in one compiled pass, against the same by single pixels in plain Python."""
+"""Plates between two others in one compiled pass, against single pixels in plain Python; and packed ones."""
 
 import math
 
@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from psvideo.plates.align.between import columns_in
 from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, JUST_BELOW, blend_rows
+from psvideo.plates.align.packed import packed
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
+from psvideo.plates.mixing.mixture import made
 
 ROWS, COLS = 22, 31
 COARSE = 11, 16
@@ -102,3 +104,13 @@ def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_se
             np.testing.assert_allclose(image[row, col], expected, atol=3e-5, err_msg=f"{row}, {col}, {what}")
             assert bool(seen[row, col]) == (known and given != NOWHERE), (row, col, what, given)
     assert {AT_REST, BEFORE, AFTER, BOTH, NOWHERE} == {*np.unique(guess)}
+
+
+@pytest.mark.parametrize(("least", "most"), [(-0.02, 1.0), (0.0, 0.3), (-3.0, 7.0)])
+def test_a_packed_picture_is_good_to_half_a_step_and_black_stays_black(least: float, most: float) -> None:
+    image = np.random.default_rng(9).uniform(least, most, (70, 12, 3)).astype(np.float32)
+    image[5] = 0
+    image[6, 0, 0], image[6, 1, 0] = least, most
+    back = packed(made(image), saturation=100.0).image()
+    assert np.abs(back - image).max() <= 0.502 * (most - min(least, 0)) / 65534  # floats round too
+    assert (back[5] == 0).all()

@@ -1,9 +1,9 @@
 """Plates of one round show different instants; here they are brought to one.
 
 ``rounds`` does it, plate by plate while a clip is read: begin there. ``comb`` lists the instants that are wanted.
-``held`` keeps sketches and plates (``packed`` into 16 bits) for as long as an instant may need them. ``between`` makes
-a light's plate at an instant from the two plates around it (its loop is in ``blend_kernel``); ``taken`` decides which
-of the two each pixel comes from.
+``held`` keeps sketches and plates (``packed`` into 16 bits, by ``pack_kernel``) for as long as an instant may need
+them. ``between`` makes a light's plate at an instant from the two plates around it (its loop is in ``blend_kernel``);
+``taken`` decides which of the two each pixel comes from.
 
 Rooms, from the bottom up:
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Coded, StoredCodes, Tone
+from psvideo.plates.align.pack_kernel import MOST_CODE, pack_rows
 from psvideo.plates.mixing.mixture import Mixture
 
-MOST_CODE = 65535
 BAND_ROWS = 64
 PutBy = Callable[[NDArray[Any]], NDArray[Any] | StoredCodes]
 """Puts codes by where they take no memory, if there is such a place; else returns them."""
@@ -29,9 +29,8 @@ def packed(picture: Mixture, saturation: float, put_by: PutBy | None = None) -> 
     codes = np.empty(image.shape, np.uint16)
 
     def pack(first: int, last: int) -> None:
-        band = image[first:last] * np.float32(1 / step)
-        band += np.float32(zero + 0.5)
-        codes[first:last] = np.clip(band, 0, MOST_CODE, out=band)
+        band = np.ascontiguousarray(image[first:last]).reshape(-1)
+        pack_rows(band, np.float32(1 / step), np.float32(zero + 0.5), codes[first:last].reshape(-1))
 
     over_ranges(pack, len(image), each=BAND_ROWS)
     tone = Tone(zero=np.full((1, 1), zero), gain=np.full((1, 1), step))

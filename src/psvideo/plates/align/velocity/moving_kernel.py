@@ -23,9 +23,11 @@ def _between(picture: Codes, row: np.float32, col: np.float32) -> np.float32:
     """A code between pixels; beyond the border it is the border's."""
     row = min(max(row, ZERO), np.float32(picture.shape[0] - 1))
     col = min(max(col, ZERO), np.float32(picture.shape[1] - 1))
-    top, left = int(row), int(col)
-    below, right = min(top + 1, picture.shape[0] - 1), min(left + 1, picture.shape[1] - 1)
-    down, across = row - np.float32(top), col - np.float32(left)
+    whole_row, whole_col = int(row), int(col)
+    top, left = np.uintp(whole_row), np.uintp(whole_col)  # unsigned: no place is counted from the end
+    below = min(top + np.uintp(1), np.uintp(picture.shape[0] - 1))
+    right = min(left + np.uintp(1), np.uintp(picture.shape[1] - 1))
+    down, across = row - np.float32(whole_row), col - np.float32(whole_col)
     upper = np.float32(picture[top, left]) * (ONE - across) + np.float32(picture[top, right]) * across
     lower = np.float32(picture[below, left]) * (ONE - across) + np.float32(picture[below, right]) * across
     return upper * (ONE - down) + lower * down
