@@ -15,10 +15,11 @@ from psvideo.sync.flashes_seen import flashes_seen
 from psvideo.sync.joined import Chapter, joined
 from psvideo.sync.restarted import recut
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.fit import find
+from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import TICKS, moved
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
+from psvideo.sync.unbroken import unbroken
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -287,3 +288,27 @@ def test_a_frame_that_is_repeated_early_in_a_noisy_clip_is_no_restart(
     timing = find_timing(plan, np.arange(46), np.insert(profiles, again, profiles[again - 1], axis=0))
     assert timing.repeated_frames == (again,)
     assert not any("started again" in note for note in timing.notes)
+
+
+def parts_of(plan: Plan, rows: Profiles, cuts: list[slice]) -> list[tuple[slice, ClipFit]]:
+    return [(cut, find(plan, rows.take(cut).one_window())) for cut in cuts]
+
+
+def test_parts_between_which_frames_are_missing_are_one_strobe(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A subject that moves hid the strobe of a clip for a while: the part behind was a frame off, and sure of it."""
+    shot = shot_of(plan, frames=FRAMES + 1)
+    profiles = np.delete(shot.frames.mean(axis=2, dtype=np.float64), BREAK, axis=0)
+    parts = parts_of(plan, rows_of(plan, profiles), [slice(0, BREAK - 9), slice(BREAK + 15, FRAMES)])
+    monkeypatch.setattr("psvideo.sync.find.found_in_parts", lambda *_: parts)
+    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    assert timing.dropped_frames == (DroppedFrames(after=BREAK - 1, count=1),)
+    assert off_s(timing, (shot, shot), plan.camera.frame_period_s).max() < 0.05 * plan.camera.row_time_s
+    assert not any("started again" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.37, 1.0, 2.6])
+def test_parts_of_a_strobe_that_began_anew_are_not_one(share: float, plan: Plan) -> None:
+    _, profiles = with_restart(plan, share * plan.cycle_s / len(plan.cycle_slots))
+    rows = rows_of(plan, profiles)
+    parts = parts_of(plan, rows, halves(BREAK))
+    assert not unbroken(plan, find(plan, rows), parts)

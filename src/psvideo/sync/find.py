@@ -28,6 +28,7 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import may_restart
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.turns import turns
+from psvideo.sync.unbroken import unbroken
 from psvideo.sync.unfired import only_fired, remarks_on_unfired, without_unfired
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
@@ -71,7 +72,7 @@ def find_timing(
         dropped=tuple(dropped),
     )
     parts = found_in_parts(plan, rows) if not verdict.believed or may_restart(plan, rows, verdict.found) else []
-    if parts:
+    if parts and not (verdict.believed and unbroken(plan, verdict.found, parts)):
         strobes = _named_strobes(plan, parts, first_light)
         chapters = [_chapter(take.only(cut), one) for (cut, _), one in zip(parts, strobes, strict=True)]
         return joined(chapters, take.dropped, take.outside([cut for cut, _ in parts]))
