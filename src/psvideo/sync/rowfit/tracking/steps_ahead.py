@@ -12,7 +12,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import Mask
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
+from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
 from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 
@@ -24,6 +24,8 @@ JUMP_COST = 2.0
 """What an unexpected step costs, in mean losses of a frame (a frame at a wrong time costs 1 to 3)."""
 TWIN_COST = 0.2
 """What it costs to take a frame that looks exactly like the one before it for the same moment."""
+MOST_GAIN = 4.0
+"""A camera changes its exposure by no more stops than two at once."""
 HOLDS = 1.0
 """A step is believed where it takes away so much of the frames' losses once brightnesses are fitted again."""
 
@@ -41,8 +43,7 @@ def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: sli
     ahead = rows.take(block)
     loss = losses_of(plan, learnt, ahead, beat, light)
     same = twins[block] if sign > 0 else np.append(twins[block][1:], twins[block.stop])
-    odd = np.convolve(loss, [0.5, 0.5], mode="same") if len(loss) > 1 else loss
-    if odd.max() < usual + SUSPICIOUS and not same.any():
+    if not same.any() and (_calm(loss, usual) or _calm(_losses_but_for_gain(plan, learnt, ahead, beat, light), usual)):
         return np.zeros(len(loss), np.int64)
     extras = np.arange(LEAST, MOST + 1)
     shifted = [replace(ahead, index=ahead.index + sign * int(extra)) for extra in extras]
@@ -52,6 +53,21 @@ def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: sli
         course = np.zeros(len(loss), np.int64)
     nearer = max(len(loss) // 2, min(len(loss), 4))
     return course[:nearer] if sign > 0 else course[-nearer:]
+
+
+def _calm(loss: FloatArray, usual: float) -> bool:
+    odd = np.convolve(loss, [0.5, 0.5], mode="same") if len(loss) > 1 else loss
+    return bool(odd.max() < usual + SUSPICIOUS)
+
+
+def _losses_but_for_gain(plan: Plan, learnt: Profiles, ahead: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+    """Return how badly known brightnesses foretell frames (frame,) that may all be brighter or darker by a gain of
+    their own, as where a camera sets its exposure: missing frames would stand for it otherwise."""
+    expected = predictions(plan, ahead, beat, light)
+    weight = 1.0 / np.maximum(learnt.spread, 0.03 * learnt.spread.max()) ** 2
+    gain = (weight * ahead.value * expected).sum(axis=1) / np.maximum((weight * expected**2).sum(axis=1), 1e-30)
+    rest = ahead.value - np.clip(gain, 1 / MOST_GAIN, MOST_GAIN)[:, None] * expected
+    return frame_losses(learnt, rest)
 
 
 def with_steps(index: IntArray, block: slice, extra: IntArray, sign: int) -> IntArray:
