@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from psvideo.errors import NoStrobeError
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Timing
@@ -312,3 +313,17 @@ def test_parts_of_a_strobe_that_began_anew_are_not_one(share: float, plan: Plan)
     rows = rows_of(plan, profiles)
     parts = parts_of(plan, rows, halves(BREAK))
     assert not unbroken(plan, find(plan, rows), parts)
+
+
+@pytest.mark.parametrize("late", [0.8, 3.3, 4.6])
+def test_a_strobe_that_paused_before_a_global_shutter_is_timed_or_refused(make_plan: PlanMaker, late: float) -> None:
+    """Frames show little more than which flash they saw: 29 missing frames explained a pause, with wrong names."""
+    plan = make_plan(height_px=48, width_px=12, readout=0.0, lights=("key", "left", "right", "top"))
+    shots, profiles = with_restart(plan, late * plan.cycle_s / len(plan.cycle_slots), cut=15)
+    profiles = profiles[:52].copy()
+    profiles[14:25] = 0.02
+    try:
+        timing = find_timing(plan, np.arange(len(profiles)), profiles)
+    except NoStrobeError:
+        return
+    assert off_s(timing, shots, plan.camera.frame_period_s, cut=20).max() < 0.1 * plan.shortest_flash_s

@@ -12,7 +12,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.restarts import chapters, reach
+from psvideo.sync.rowfit.restarts import chapters, lit_stretches, reach
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.verdict.believed import believed_fit, doubtful
 from psvideo.sync.verdict.refusal import nothing_to_find
@@ -34,6 +34,8 @@ def found_in_parts(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]:
     """Return the frames of every part of a clip in which the strobe is found, and its fit; nothing where the strobe
     neither started again nor stopped, or is not found for sure. ``rows`` are laid out from the picture's top row."""
     cuts = list(chapters(plan, rows))
+    if len(cuts) < 2:
+        cuts = list(lit_stretches(plan, rows))
     if len(cuts) < 2:
         return []
     parts = _judged(plan, rows, cuts)

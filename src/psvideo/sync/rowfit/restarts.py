@@ -53,6 +53,11 @@ def may_restart(plan: Plan, rows: Profiles, found: ClipFit) -> bool:
     elsewhere in its cycle or none at all does."""
     if found.steps > 0 or _stands(plan, rows).any() or lost_somewhere(plan, found):
         return True
+    return odd_somewhere(found)
+
+
+def odd_somewhere(found: ClipFit) -> bool:
+    """Return whether a fit leaves much more in some frames in a row than in most."""
     loss = frame_losses(found.rows, found.fit.rest)
     if len(loss) < 2 * ODD_RUN:
         return False
@@ -77,11 +82,21 @@ def chapters(plan: Plan, rows: Profiles) -> tuple[slice, ...]:
     return tuple(sorted(done, key=lambda one: one.start))
 
 
+def lit_stretches(plan: Plan, rows: Profiles) -> tuple[slice, ...]:
+    """Return the stretches of frames that flashes light and those that none does, all frames as one where none is dark
+    for longer than the plan is: what stopped there may go on elsewhere in its cycle."""
+    return tuple(_runs_alike(unlit(plan, rows)))
+
+
+def _runs_alike(mask: Mask) -> list[slice]:
+    edges = [0, *(np.flatnonzero(np.diff(mask)) + 1).tolist(), len(mask)]
+    return [slice(first, end) for first, end in pairwise(edges)]
+
+
 def _moving_and_still(plan: Plan, rows: Profiles) -> tuple[list[slice], list[slice]]:
     """Return the stretches of frames that change, and those in which the picture stands still in flashes' stead."""
     stands = _stands(plan, rows)
-    edges = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
-    parts = [slice(first, end) for first, end in pairwise(edges)]
+    parts = _runs_alike(stands)
     return [one for one in parts if not stands[one.start]], [one for one in parts if stands[one.start]]
 
 
