@@ -16,11 +16,14 @@ from psvideo.sync.flashes_seen import flashes_seen
 from psvideo.sync.joined import Chapter, joined
 from psvideo.sync.restarted import recut
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import TICKS, moved
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
+from psvideo.sync.rowfit.tracking.steps_ahead import steps_ahead
 from psvideo.sync.unbroken import unbroken
+from psvideo.sync.verdict.believed import convincing
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -327,3 +330,35 @@ def test_a_strobe_that_paused_before_a_global_shutter_is_timed_or_refused(make_p
     except NoStrobeError:
         return
     assert off_s(timing, shots, plan.camera.frame_period_s, cut=20).max() < 0.1 * plan.shortest_flash_s
+
+
+@pytest.mark.parametrize("seed", [23, 27, 30])
+def test_frames_that_are_all_darker_are_not_missing_elsewhere(make_plan: PlanMaker, seed: int) -> None:
+    """A camera that changed its gain after 13 frames was taken for one that lost 23 frames there."""
+    plan = make_plan(height_px=48, width_px=12, dark=False, shutter=0.25, readout=0.84, duration_s=0.0014)
+    rng, down = np.random.default_rng(seed), np.linspace(0, 1, 48)[:, None] * np.ones(12)
+
+    def scene() -> FloatArray:
+        waves = 0.4 + 0.3 * np.sin(rng.uniform(1, 9) * down + rng.uniform(0, 6)) * rng.uniform(0.3, 1)
+        return np.asarray(waves.astype(np.float32) * rng.uniform(0.4, 1), np.float32)
+
+    plates = {slot: scene() for slot in plan.lit_slots}
+    noise = Noise(full_well_e=20_000, read_e=8)
+    shot = expose(plates, plan, frames=41, clock=TrueClock(phase_s=PHASE_S, offset_ppm=180.0), noise=noise, bits=12)
+    profiles = shot.frames.mean(axis=2, dtype=np.float64)
+    profiles[13:] *= 0.5
+    profiles += np.random.default_rng(1).normal(0, 0.002, profiles.shape)
+    beat = replace(first_guess(plan), clock=FoundClock(phase_s=PHASE_S, offset_ppm=180.0))
+    none = np.zeros(len(profiles), np.bool_)
+    extra = steps_ahead(plan, rows_of(plan, profiles), beat, slice(13, 37), slice(0, 13), none, -1)
+    assert not extra.any()
+
+
+@pytest.mark.parametrize("readout", [0.0, 1.0])
+def test_many_missing_frames_convince_only_where_rows_see_flashes_one_after_another(
+    make_plan: PlanMaker, readout: float
+) -> None:
+    plan = make_plan(height_px=48, width_px=12, readout=readout)
+    found = find(plan, rows_of(plan, shot_of(plan, frames=52).frames.mean(axis=2, dtype=np.float64)))
+    assert convincing(plan, found)
+    assert convincing(plan, replace(found, steps=2, strayed=29)) == (readout > 0)
