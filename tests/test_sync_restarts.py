@@ -338,7 +338,7 @@ def test_frames_that_are_all_darker_are_not_missing_elsewhere(make_plan: PlanMak
     plan = make_plan(height_px=48, width_px=12, dark=False, shutter=0.25, readout=0.84, duration_s=0.0014)
     rng, down = np.random.default_rng(seed), np.linspace(0, 1, 48)[:, None] * np.ones(12)
 
-    def scene() -> FloatArray:
+    def scene() -> NDArray[np.float32]:
         waves = 0.4 + 0.3 * np.sin(rng.uniform(1, 9) * down + rng.uniform(0, 6)) * rng.uniform(0.3, 1)
         return np.asarray(waves.astype(np.float32) * rng.uniform(0.4, 1), np.float32)
 
