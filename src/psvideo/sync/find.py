@@ -21,11 +21,11 @@ from psvideo.model.units import counted
 from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
 from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
-from psvideo.sync.restarted import found_in_parts
+from psvideo.sync.restarted import found_beside_dark, found_in_parts
 from psvideo.sync.rowfit.beat import Beat, train_until
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.restarts import may_restart
+from psvideo.sync.rowfit.restarts import may_restart, odd_somewhere
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.turns import turns
 from psvideo.sync.unbroken import unbroken
@@ -71,8 +71,8 @@ def find_timing(
         numbers=np.asarray(indices if numbers is None else numbers, np.int64),
         dropped=tuple(dropped),
     )
-    parts = found_in_parts(plan, rows) if not verdict.believed or may_restart(plan, rows, verdict.found) else []
-    if parts and not (verdict.believed and unbroken(plan, verdict.found, parts)):
+    parts = _parts(plan, rows, verdict)
+    if parts:
         strobes = _named_strobes(plan, parts, first_light)
         chapters = [_chapter(take.only(cut), one) for (cut, _), one in zip(parts, strobes, strict=True)]
         return joined(chapters, take.dropped, take.outside([cut for cut, _ in parts]))
@@ -101,6 +101,20 @@ class _Take:
         edges = [0, *(edge for part in parts for edge in (part.start, part.stop)), len(self.numbers)]
         gaps = zip(edges[::2], edges[1::2], strict=True)
         return [(int(self.numbers[first]), int(self.numbers[end - 1])) for first, end in gaps if end > first]
+
+
+def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, ClipFit]]:
+    """Return the parts of a clip in which the strobe is found, nothing where the clip is one. A part beside the dark is
+    believed alone only where the whole clip is not, or fits some of it worse."""
+    whole, believed = verdict.found, verdict.believed
+    if believed and not may_restart(plan, rows, whole):
+        return []
+    parts = found_in_parts(plan, rows)
+    if not parts:
+        parts = found_beside_dark(plan, rows)
+        if believed and len(parts) == 1 and not odd_somewhere(whole):
+            return []
+    return [] if believed and unbroken(plan, whole, parts) else parts
 
 
 def _named_strobes(plan: Plan, parts: Sequence[tuple[slice, ClipFit]], first_light: str | None) -> list["FoundStrobe"]:

@@ -33,9 +33,15 @@ Part = tuple[slice, ClipFit | None]
 def found_in_parts(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]:
     """Return the frames of every part of a clip in which the strobe is found, and its fit; nothing where the strobe
     neither started again nor stopped, or is not found for sure. ``rows`` are laid out from the picture's top row."""
-    cuts = list(chapters(plan, rows))
-    if len(cuts) < 2:
-        cuts = list(lit_stretches(plan, rows))
+    return _found(plan, rows, chapters(plan, rows))
+
+
+def found_beside_dark(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]:
+    """Return the same of the stretches of frames between which no flash lights any, nothing where all are lit."""
+    return _found(plan, rows, lit_stretches(plan, rows))
+
+
+def _found(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[tuple[slice, ClipFit]]:
     if len(cuts) < 2:
         return []
     parts = _judged(plan, rows, cuts)

@@ -8,7 +8,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock, train_between
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.restarts import APART, odd_somewhere
+from psvideo.sync.rowfit.restarts import APART
 from psvideo.sync.rowfit.strobed import lost_somewhere
 
 PLACES = 7
@@ -23,12 +23,10 @@ def unbroken(plan: Plan, whole: ClipFit, parts: Sequence[tuple[slice, ClipFit]])
     """Return whether the strobe of a whole clip, with the frames that it finds missing, is that of each of its parts.
 
     All of a part's flashes then fire at the whole's times, and each part keeps the same place in its cycle. A subject
-    that moves may hide the strobe for a while, so that a clip seems to fall into parts. Frames that show no strobe, or
-    that fit worse than most beside one part alone, are where it began or stopped.
+    that moves may hide the strobe for a while, so that a clip seems to fall into parts. One part alone, or frames that
+    show no strobe, are one that began or stopped.
     """
-    if whole.strayed > FEW * whole.steps or lost_somewhere(plan, whole):
-        return False
-    if len(parts) < 2 and odd_somewhere(whole):
+    if len(parts) < 2 or whole.strayed > FEW * whole.steps or lost_somewhere(plan, whole):
         return False
     late_s, turned_s = np.concatenate([_apart_s(plan, whole, cut, found) for cut, found in parts]).T
     cycle_s = plan.cycle_s * whole.fit.beat.clock.rate
