@@ -144,6 +144,19 @@ def test_cameras_of_different_strobes_are_refused(make_plan: PlanMaker) -> None:
     other = make_plan(duration_s=0.0009)
     with pytest.raises(PsvideoError, match="strobe is not A's"):
         camera_clocks([first, seen(replace(other, dark_code=6), TRUE, begin=0, count=200)])
+    with pytest.raises(PsvideoError, match=r"expected 0\.[0-9]+ ms of flash 1, found 0\.9 ms"):
+        camera_clocks([first, seen(replace(other, dark_code=6), TRUE, begin=0, count=200)])
+    darker = replace(plan, dark_s=plan.dark_s + 1e-3)
+    with pytest.raises(PsvideoError, match=r"expected a dark time of [0-9.]+ ms, found [0-9.]+ ms, as"):
+        camera_clocks([first, seen(darker, TRUE, begin=0, count=200)])
+    names = {light: f"{light}2" for light in plan.lights}
+    renamed = tuple(
+        replace(one, lights={names[light]: power for light, power in one.lights.items()}) for one in plan.flashes
+    )
+    with pytest.raises(
+        PsvideoError, match=f"expected {plan.lights[0]} in flash 1 of the round, found {plan.lights[0]}2"
+    ):
+        camera_clocks([first, replace(first, plan=replace(plan, flashes=renamed))])
     with pytest.raises(PsvideoError, match="saw different strobes"):
         camera_clocks([first, seen(plan, replace(TRUE, rate_ppm=2400.0), begin=0, count=200)])
     with pytest.raises(PsvideoError, match="share 0 flash"):
@@ -220,6 +233,13 @@ def test_sync_of_several_clips_of_unlike_cameras_writes_their_clocks(
     assert (clocks["schema"], clocks["reference"], clocks["numbering"]) == ("psvideo-clocks/1", "A", "marker")
     assert found["offset_s"] == pytest.approx(later_s, abs=2e-6)
     assert found["rate_ppm"] == pytest.approx(35.0, abs=5.0)
+    (tmp_path / "again").mkdir()
+    alike = other.rename(tmp_path / "again" / "A")
+    assert main(["sync", str(first), str(alike), "-o", str(tmp_path / "alike.json")]) == 0
+    assert "2 clips are called A" in capsys.readouterr().err
+    assert main(["sync", str(first), str(first), "--starts", "0,0", "-o", str(tmp_path / "one.json")]) == 0
+    assert "are called" not in capsys.readouterr().err, "one clip against itself"
+    other = alike.rename(tmp_path / "B")
     assert main(["sync", str(first), str(other), "--first-light", "a"]) == 2
     assert "belongs to one clip" in capsys.readouterr().err
     assert main(["sync", str(first), str(other), "--starts", "0"]) == 2

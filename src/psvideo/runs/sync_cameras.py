@@ -1,6 +1,6 @@
 """The whole of ``psvideo sync`` for several cameras: clips of one strobe in, their clocks against each other out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from psvideo.compute.progress import Watch, unwatched
@@ -9,6 +9,7 @@ from psvideo.formats.clocks_json import SCHEMA, format_clocks
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
 from psvideo.model.camera_clocks import CameraClocks
+from psvideo.model.units import counted
 from psvideo.runs.steps.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.open_take import open_take
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
@@ -76,8 +77,21 @@ def sync_cameras(
             caller.warn(f"{take.clip.name}: {note}")
         takes.append(CameraTake(plan=take.plan, timing=timing))
     clocks = camera_clocks(takes, starts_s=starts_s)
-    for note in clocks.notes:
+    for note in (*clocks.notes, *_named_alike([path_of("clips", clip) for clip in clips], clocks)):
         caller.warn(note)
     if out is not None:
         write_text(out, format_clocks(clocks))
     return clocks
+
+
+def _named_alike(paths: Sequence[Path], clocks: CameraClocks) -> Iterator[str]:
+    """Yield what to say of different clips of one name: clocks are known by clips' names afterwards."""
+    by_name: dict[str, set[Path]] = {}
+    for path, camera in zip(paths, clocks.cameras, strict=True):
+        by_name.setdefault(camera.clip, set()).add(path.resolve())
+    for name, places in by_name.items():
+        if len(places) > 1:
+            yield (
+                f"{counted(len(places), 'clip')} are called {name}: which of these clocks is whose cannot be told "
+                "afterwards, and `resync` refuses them. Give each folder or file a name of its own, and compare again."
+            )

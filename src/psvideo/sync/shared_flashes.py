@@ -13,7 +13,7 @@ import numpy as np
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 from psvideo.model.marker import cycle_places
-from psvideo.model.plan import Plan
+from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.timing import Timing
 from psvideo.model.units import MISNAMED_PPM, counted
 from psvideo.strobe.runlog import CAMERA_CLOCK_PPM
@@ -26,6 +26,9 @@ LEAST_ERROR_S = 0.2e-6
 """No time is taken to be known better than so: shutters and LEDs are not."""
 NEAR = 0.25
 """A start that is given decides between cycles where it is off by less than this share of one."""
+
+SAME_S = 1e-9
+"""Dark times that were computed may differ by so much and be the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,13 +71,32 @@ def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | No
 
 def _refuse_other_plan(first: CameraTake, take: CameraTake) -> None:
     one, other = (replace(each.plan, camera=first.plan.camera, clock_tolerance_ppm=None) for each in (first, take))
-    if abs(one.dark_s - other.dark_s) > 1e-9 or replace(one, dark_s=other.dark_s) != other:
+    if abs(one.dark_s - other.dark_s) > SAME_S or replace(one, dark_s=other.dark_s) != other:
         raise PsvideoError(
-            f"{take.timing.clip}: its plan's strobe is not {first.timing.clip}'s: expected the same flashes, dark time "
-            f"({one.dark_s * 1e3:.6g} ms, found {other.dark_s * 1e3:.6g} ms) and dark slots in both, as one strobe "
-            "played them. Put the plan that was played beside every clip, with each camera's own [camera] table and "
-            "dark_s written out."
+            f"{take.timing.clip}: its plan's strobe is not {first.timing.clip}'s: expected "
+            f"{_first_difference(one, other)}, as one strobe played both. Put the plan that was played beside every "
+            "clip, with each camera's own [camera] table and dark_s written out."
         )
+
+
+def _first_difference(one: Plan, other: Plan) -> str:
+    """Return what of the first plan's strobe another plan has otherwise, and what was found in that."""
+    if len(one.flashes) != len(other.flashes):
+        return f"a round of {counted(len(one.flashes), 'flash')}, found {len(other.flashes)}"
+    for number, (first, found) in enumerate(zip(one.flashes, other.flashes, strict=True), 1):
+        if first.lights != found.lights:
+            return f"{_lit_words(first)} in flash {number} of the round, found {_lit_words(found)}"
+        if first.duration_s != found.duration_s:
+            return f"{first.duration_s * 1e3:.6g} ms of flash {number}, found {found.duration_s * 1e3:.6g} ms"
+    if abs(one.dark_s - other.dark_s) > SAME_S:
+        return f"a dark time of {one.dark_s * 1e3:.6g} ms, found {other.dark_s * 1e3:.6g} ms"
+    return "the same mode, dark slots, and rise and fall times"
+
+
+def _lit_words(flash: PlannedFlash) -> str:
+    return (
+        " + ".join(light if power == 1 else f"{light} at {power:g}" for light, power in flash.lights.items()) or "dark"
+    )
 
 
 def _refuse_guess(timing: Timing) -> None:
