@@ -290,3 +290,14 @@ def test_numberings_are_looked_for_where_nearly_all_frames_of_a_stretch_are_alik
     seeds = list(other_seeds(plan, rows))
     assert seeds
     assert all(len(seed.numbering.index) > 100 for seed in seeds)
+
+
+@pytest.mark.parametrize("missing", [3, 7])
+def test_where_many_frames_are_missing_the_strobe_may_have_started_again(plan: Plan, missing: int) -> None:
+    shot = shot_of(plan, FRAMES + missing)
+    kept = np.delete(shot.frames.mean(axis=2, dtype=np.float64), slice(31, 31 + missing), axis=0)
+    timing = find_timing(plan, np.arange(FRAMES), kept)
+    assert timing.dropped_frames == (DroppedFrames(after=30, count=missing),)
+    notes = [note for note in timing.notes if "started again may look the same" in note]
+    assert len(notes) == (missing > 3)
+    assert all("Behind frame 30 " in note and "7 frames" in note and "58.39 ms" in note for note in notes)

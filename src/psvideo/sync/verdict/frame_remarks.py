@@ -6,8 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.plan import Plan
+from psvideo.model.units import show_seconds
 from psvideo.sync.rowfit.coarse.retime import regular_step
 from psvideo.sync.rowfit.fit import ClipFit
+
+MANY = 4
+"""From so many frames missing in one place, a strobe that started again is as likely."""
 
 
 def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -> Iterator[str]:
@@ -30,6 +34,8 @@ def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -
             f"Of every {step.denominator} frames the clip repeats {step.denominator - step.numerator}, regularly, as a "
             f"movie that was made {rate:.6g} frames a second from {shown}; repeated ones are left out."
         )
+    if step == 1:
+        yield from _many_missing(found, index, numbered)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], found.unlit.astype(np.int64), [0]])))
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         yield (
@@ -43,3 +49,14 @@ def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -
                 f"The {name} frame (or the {name} few) fit no place in time, or more than one, as when frames are "
                 f"missing beside them: flashes that they saw are marked as incomplete."
             )
+
+
+def _many_missing(found: ClipFit, index: NDArray[np.int64], numbered: NDArray[np.int64]) -> Iterator[str]:
+    """Say where so many frames are missing that it may be the strobe: both give the same picture."""
+    missing = np.diff(index) - np.diff(numbered)
+    for n in np.flatnonzero(missing >= MANY).tolist():
+        yield (
+            f"Behind frame {numbered[n]} the picture goes on as if {missing[n]} frames were missing that the numbers "
+            "do not show. A strobe that started again may look the same: then the same flashes lie in the same frames, "
+            f"but {show_seconds(float(missing[n]) * found.rows.period_s)} earlier than the times given."
+        )
