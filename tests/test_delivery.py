@@ -382,3 +382,17 @@ def test_positions_without_metres_are_left_out_of_a_programs_delivery_and_refuse
     assert "has no positions" in " ".join(capsys.readouterr().out.split())
     assert not {"position", "depth"} & {path.name for path in (tmp_path / "out").iterdir()}
     assert "position" not in (tmp_path / "out" / "README-houdini.txt").read_text(encoding="utf-8").lower()
+
+
+@pytest.mark.parametrize("program", ["houdini", "nuke"])
+def test_depth_alone_is_no_position_in_a_programs_note(program: Program) -> None:
+    delivery, _ = delivery_of(replace(NOTHING, preset=program, aov=("depth",)))
+    delivery = replace(delivery, aovs=tuple(one for one in delivery.aovs if one != "position"))
+    made = Delivered(
+        clip="take7", first=1, last=9, fps=Fraction(24), width_px=64, height_px=48, metric=False, delivery=delivery
+    )
+    said = loading_note(program, made)
+    assert "Depth is in a relative unit." in said
+    assert "Positions are" not in said
+    assert "positions = position" not in said
+    assert "relative positions" not in said

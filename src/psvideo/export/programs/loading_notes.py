@@ -54,9 +54,11 @@ def _facts(made: Delivered) -> list[str]:
     ]
     if made.delivery.png16:
         facts.append("PNG, 16 bits: 0.5 + 0.5 n, data as well. Its tags say linear, but many programs assume sRGB.")
-    if made.delivery.needs_depth:
+    if "position" in made.delivery.aovs:
         unit = "the unit of the camera's file" if space.name == "world" else "metres"
         facts.append(f"Positions are in the frame of the normals, in {unit if made.metric else 'a relative unit'}.")
+    elif made.delivery.needs_depth:
+        facts.append(f"Depth is in {'metres' if made.metric else 'a relative unit'}.")
     return [
         *facts,
         "valid/ is 1 where a normal was measured and is to be trusted; where it is 0, a normal is a best estimate at "
@@ -91,7 +93,7 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
             f"The parts of the file are layers of these names: {', '.join(made.delivery.bundle)}. x, y, z are in red, "
             "green, blue; beauty is the sum of all lights, with alpha.",
             "Shuffle albedo into rgba, valid into alpha.",
-            *(relight if made.delivery.needs_depth else [without]),
+            *(relight if "position" in made.delivery.aovs else [without]),
         ],
         [
             "Without Raw Data a colour space may be applied to vectors: the light comes from wrong directions.",
@@ -153,7 +155,7 @@ def _unreal(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     )
 
 
-UNSIZED = ("One Houdini unit is a metre: relative positions (see above) have no size.",)
+UNSIZED = ("One Houdini unit is a metre: what is relative (see above) has no size.",)
 POINTS = (
     "Points: read position and normals into P and N of a grid of points by pixel, and delete points where valid is 0.",
 )
