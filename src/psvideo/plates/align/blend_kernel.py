@@ -142,6 +142,8 @@ def blend_rows(
     line_x, line_y = lent(lines)[0], lent(lines)[1]
     addresses = before.ctypes.data, after.ctypes.data
     all_early, all_late = there.size == 1 and there[0, 0], there_late.size == 1 and there_late[0, 0]
+    clipping, total = marked.size > 1 or marked_late.size > 1, count[0] + count[1]
+    both = count[0] / total, count[1] / total
     first_before, first_after = np.float32(firsts[0]), np.float32(firsts[1])
     for some in range(made.shape[0]):
         row, y = np.uintp(some), np.float32(first + some)
@@ -182,13 +184,16 @@ def blend_rows(
                 from_early = _moved(one, addresses[0], marked, limit[0], early_x, early_y - first_before)
             if late > ZERO:
                 from_late = _moved(two, addresses[1], marked_late, limit[1], late_x, late_y - first_after)
-            clips = early > ZERO and _clips(from_early, limit[0]), late > ZERO and _clips(from_late, limit[1])
-            if early > ZERO and late > ZERO and clips[0] != clips[1]:
-                early, late = (early, ZERO) if early >= late else (ZERO, late)
-            total = early + late
-            early, late = early / total, late / total
-            if (early > ZERO and clips[0]) or (late > ZERO and clips[1]):
-                early, late, from_early = ONE, ZERO, (limit[2], limit[2], limit[2])
+            if early > ZERO and late > ZERO:
+                early, late = both[0], both[1]
+            else:
+                early, late = (ONE, ZERO) if early > ZERO else (ZERO, ONE)
+            if clipping:
+                clips = early > ZERO and _clips(from_early, limit[0]), late > ZERO and _clips(from_late, limit[1])
+                if early > ZERO and late > ZERO and clips[0] != clips[1]:
+                    early, late = (ONE, ZERO) if early >= late else (ZERO, ONE)
+                if (early > ZERO and clips[0]) or (late > ZERO and clips[1]):
+                    early, late, from_early = ONE, ZERO, (limit[2], limit[2], limit[2])
             made[row, col, 0] = early * from_early[0] + late * from_late[0]
             if three:
                 made[row, col, 1] = early * from_early[1] + late * from_late[1]
