@@ -1,5 +1,6 @@
 """Every threshold of a verdict separates footage that is just good from footage that is just not."""
 
+import re
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -659,6 +660,23 @@ def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_ex
     doubted = [line for line in rig_of(one) if line.grade != "good"]
     assert [line.subject for line in doubted] == ([] if subject == "nothing" else [subject])
     assert verdict_of(doubted).startswith("This take is usable") == (subject != "rig")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("shape", "sheen"), [("ball", (0.4, 30)), ("waves", (0.8, 6))])
+def test_among_many_lights_those_that_are_not_as_strong_as_the_rig_says_are_named(
+    shape: str, sheen: tuple[float, float], seed: int
+) -> None:
+    """Photographs of a bear, of which a few were a quarter brighter, were said to show a surface that is not matte."""
+    off, right = (
+        Footage(shape=shape, lights=8, gains=gains, sheen=sheen, solved=True).observed(seed)
+        for gains in ([1.0, 1.2, 1.0, 1.0, 1.0, 0.82, 1.0, 1.0], [1.04, 0.96] * 4)
+    )
+    (line,) = (one for one in rig_but_leaning(off) if one.grade != "good")
+    assert (line.subject, line.grade) == ("rig", "doubtful")
+    assert re.search(r"it would: 'light5' 8[1-4] %, 'light1' 1(1[7-9]|2[01]) % of what the rig says", line.found)
+    assert not any("other strengths" in one.found for one in rig_of(right))
+    assert "not as strong" in " ".join(one.found for one in result.accuracy(off))
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -2,8 +2,15 @@
 
 from collections.abc import Iterator
 
+from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.rig_by_normals import facing_away, lights_crossed, normals_lean, surface_shines
-from psvideo.report.judge.rig_by_plates import lights_near, other_curve, rig_explains, rig_misfits, shining_surface
+from psvideo.report.judge.rig_by_plates import (
+    lights_near,
+    other_curve,
+    rig_explains,
+    rig_misfits,
+    shining_surface,
+)
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
@@ -18,7 +25,8 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     wrong = None if fit is None or curve else rig_misfits(firing, fit)
     crossed, away = lights_crossed(observed, guessed=guessed), facing_away(observed)
     leaning = None if curve or wrong or crossed or away else normals_lean(observed)
-    shines = wrong is not None and not crossed and not away and surface_shines(observed)
+    by_strength = fit is not None and bool(other_strengths(firing, fit))
+    shines = wrong is not None and not (crossed or away or by_strength) and surface_shines(observed)
     near = None if fit is None or curve or shines else lights_near(fit)
     if fit is not None and shines:
         yield shining_surface(fit)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
@@ -150,6 +151,8 @@ def _why_off(observed: Observed) -> tuple[str, str]:
     if any(one.shows for one in observed.astray):
         return "the pictures are not aligned", "See the line on motion"
     fit = observed.rig_fit
+    if fit is not None and other_strengths(observed.lights, fit):
+        return "some lights are not as strong as the rig says", "See the line on the rig"
     if fit is not None and fit.excess > NOT_MATTE:
         return (
             "other directions of the lights would explain more: they are a few degrees off, or the surface is glossy",

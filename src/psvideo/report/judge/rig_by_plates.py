@@ -6,6 +6,7 @@ import numpy as np
 
 from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED
+from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.result import COMMON_DEG
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
@@ -15,8 +16,6 @@ MISFIT, LOST_MISFIT = 0.135, 0.25
 0.11 to 0.13 on photographs, two lights exchanged among five 0.18, a list in another order 0.19."""
 LEFT_OVER = 0.1
 """Where more is left over under a rig that is right, the report says what it may come from."""
-STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
-"""Less is enough where other strengths of some lights, half of them at most, take half of it away."""
 NEARER = 0.7
 """Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
 widths away that a rig takes for distant: 0.2 to 0.5.) A surface that is not matte, as skin, explains a face's light
@@ -44,26 +43,22 @@ def rig_explains(fit: RigFit) -> Judgement:
 
 def rig_misfits(lights: Sequence[str], fit: RigFit) -> Judgement | None:
     """Judge how much of the light cannot come from the rig's lights; None where little."""
-    off = [
-        (light, strength)
-        for light, strength in zip(lights, fit.strengths, strict=True)
-        if not 1 / OTHER_STRENGTH < strength < OTHER_STRENGTH
-    ]
-    some = 0 < len(off) <= len(lights) / 2
-    by_strength = some and fit.excess > STRENGTH_MISFIT and fit.scaled_misfit < BY_STRENGTH * fit.misfit
-    if fit.excess <= MISFIT and not by_strength:
+    off = other_strengths(lights, fit)
+    if fit.excess <= MISFIT and not off:
         return None
     grade: Grade = "bad" if fit.excess > LOST_MISFIT else "doubtful"
     found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
-    if by_strength:
+    if off:
         off.sort(key=lambda one: -abs(float(np.log(max(one[1], 1e-6)))))
         named = listed([f"{light!r} {100 * strength:.0f} %" for light, strength in off], NAMED)
         named += "," if len(off) > NAMED else ""
+        turned = "" if fit.lamps is None else f" That turns a typical normal by {max(fit.lamps.turned_deg, 1):.0f}°."
         return Judgement(
             subject="rig",
             grade=grade,
-            found=f"{found}; with other strengths it would: {named} of what the rig says.",
-            advice="Check the power and the driver of these lights, or calibrate the rig again.",
+            found=f"{found}; with other strengths it would: {named} of what the rig says.{turned}",
+            advice="Check the power and the driver of these lights, of photographs their exposures too, or measure the "
+            "strengths in these very pictures: psvideo calibrate intensities.",
         )
     return Judgement(
         subject="rig",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.report.observe.rig_and_curve.lamp_strengths import LampStrengths, lamp_strengths
 from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
 from psvideo.report.observe.rig_and_curve.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
 
@@ -25,7 +26,8 @@ class RigFit:
     explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``scaled_misfit`` what
     is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
     ``near`` is how near lamps stand that the rig takes for distant, ``curves`` what is left over under other transfer
-    curves; both None where it says where they stand."""
+    curves; both None where it says where they stand. ``lamps`` are strengths that shadows and highlights change little;
+    None where lights are too few for that."""
 
     misfit: float
     own_misfit: float
@@ -33,6 +35,7 @@ class RigFit:
     strengths: tuple[float, ...]
     near: Nearness | None = None
     curves: OtherCurves | None = None
+    lamps: LampStrengths | None = None
 
     @property
     def excess(self) -> float:
@@ -46,7 +49,8 @@ def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = 
     lights, or where too few points are reached by all of them."""
     count = light.shape[1]
     peak = light.max(axis=1)
-    reached = (light.min(axis=1) > SHADOW * peak) & (peak > LEAST_LIGHT * 1e-3)
+    lit = peak > LEAST_LIGHT * 1e-3
+    reached = (light.min(axis=1) > SHADOW * peak) & lit
     if count < 4 or reached.sum() < LEAST_POINTS:
         return None
     unit = light[reached] / np.linalg.norm(light[reached], axis=1, keepdims=True)
@@ -67,7 +71,10 @@ def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = 
         near = nearness(unit, beyond[0], vectors[0], places[reached])
         curves = other_curves(light[reached], beyond[0])
     scaled = float(np.sqrt(max(share, 0)))
-    return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves)
+    return RigFit(
+        misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves,
+        lamps=lamp_strengths(light[lit], vectors if len(vectors) == 1 else vectors[lit]),
+    )  # fmt: skip
 
 
 def _beyond(vectors: FloatArray) -> FloatArray:
