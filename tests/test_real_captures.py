@@ -87,6 +87,43 @@ def test_the_ball_of_48_lights_reaches_the_published_least_squares(shared_data: 
     assert errors_deg(normals, true)[solved].mean() <= 4.2
 
 
+BRIGHTER, USUAL = (2, 8, 11, 14), (34, 50, 75, 76, 77, 89, 92, 94)
+
+
+def test_photographs_that_are_brighter_than_their_list_says_are_named_and_their_strengths_are_measured(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The bear's first 19 photographs are a quarter brighter than the other 77."""
+    folder, stills, rig = shared_data / "diligent_photos" / "bear", tmp_path / "bear", tmp_path / "rig.toml"
+    stills.mkdir()
+    told = ['schema = "psvideo-rig/1"']
+    for light in csv.DictReader((folder / "lights.csv").read_text().splitlines()):
+        if int(light["file"][:3]) in BRIGHTER + USUAL:
+            (stills / light["file"]).symlink_to(folder / light["file"])
+            way, strength = (
+                [float(light[key]) for key in keys] for keys in (("dx", "dy", "dz"), ("e_r", "e_g", "e_b"))
+            )
+            told.append(f'[[light]]\nname = "{light["file"][:3]}"\ndirection = {way}\nintensity = {strength}')
+    rig.write_text("\n".join(told))
+    true, common = np.load(folder / "normal_gt.npy").astype(np.float64), ("--transfer", "linear")
+    inside = read_picture(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
+
+    def solved(rig: Path, out: Path) -> tuple[str, float]:
+        words = (stills, "--lights", rig, "--mask", folder / "mask.png", *common, "--no-rti", "-o", out)
+        assert run("stills", *words) == 0
+        normals = planes(out / "normals" / "bear_normals.1001.exr")
+        return capsys.readouterr().err, float(errors_deg(normals, true)[inside].mean())
+
+    said, before_deg = solved(rig, tmp_path / "out")
+    assert "with other strengths it would" in said
+    assert all(f"'{name:03d}' 1" in said for name in BRIGHTER)
+    assert not any(f"'{name:03d}'" in said for name in USUAL)
+    assert run("calibrate", "intensities", stills, "--rig", rig, *common, "-o", tmp_path / "measured.toml") == 0
+    said, after_deg = solved(tmp_path / "measured.toml", tmp_path / "again")
+    assert "other strengths" not in said
+    assert after_deg < 0.6 * before_deg < 7
+
+
 def test_a_real_raw_frame_is_a_clip_of_one_light(shared_data: Path, tmp_path: Path) -> None:
     clip = tmp_path / "chart"
     clip.mkdir()

@@ -8,12 +8,12 @@ STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 """Of the light that another rig would explain, what counts where other strengths of some lights, half of them at most,
 take half of it away."""
 OTHER_LAMP, BY_LAMP, TURNED_DEG, OF_OWN = 1.12, 0.6, 1.5, 1.5
-"""Under many lights strengths that shadows and highlights change little count where they leave at most the second share,
-turn normals by more than the third, and leave no more than so many times what no rig would explain: other directions
-leave more. On photographs of a bear, a cat, a ball and a sphere, 8 to 12 lights: none of 45 sets with right rigs, 1 of
-135 with directions that are off by 3 to 10 degrees. Two lights that are 1.3 and 0.75 times as strong are named in 29 of
-45 sets, of 8 in 14 of 16; a single one of ten mostly does no harm. The bear's first 19 photographs are a quarter
-brighter than the rest, and named."""
+"""Under many lights strengths that shadows and highlights change little count where they leave at most the second
+share, turn normals by more than the third, and leave no more than so many times what no rig would explain: other
+directions leave more. On photographs of a bear, a cat, a ball and a sphere, 8 to 12 lights: none of 45 sets with right
+rigs, 1 of 135 with directions that are off by 3 to 10 degrees. Two lights that are 1.3 and 0.75 times as strong are
+named in 29 of 45 sets, of 8 in 14 of 16; a single one of ten mostly does no harm. The bear's first 19 photographs are a
+quarter brighter than the rest, and named."""
 
 
 def other_strengths(lights: Sequence[str], fit: RigFit) -> list[tuple[str, float]]:
