@@ -174,7 +174,7 @@ def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> No
     pictures = sphere_pictures(directions, strengths)
     found = measure_strengths(pictures, directions)
     np.testing.assert_allclose(found.intensity, strengths / strengths.mean(axis=0), rtol=0.01)
-    assert found.error.max() < 0.02
+    assert 0.01 < found.error.max() < 0.04, "directions are known to a degree at best"
     shining = np.array(pictures.images)
     shining[:2] += 0.3 * (np.random.default_rng(1).random(shining[:2].shape[:3]) < 0.02)[..., None]
     of_shining = measure_strengths(light_pictures(pictures.names, list(shining)), directions)

@@ -26,6 +26,9 @@ BLOCKS, FEWEST_OF_A_BLOCK = 4, 20
 """The jackknife leaves out one of this many times this many blocks of the picture, of which so many pixels counted."""
 TURNS, WIDTH = 6, 2.0
 """How often weights are found again, and how wide they are in standard deviations of what is left over."""
+DIRECTIONS_DEG, TRIALS = 1.0, 8
+"""No rig's directions are known better; so often strengths are fitted to directions that are off by that, each its own
+way. Lights that stand close together show their strengths badly, and no part of the picture says so."""
 MOST_DOUBT = 0.2
 """A scene whose parts differ by more (relative standard error) does not show the lights' strengths."""
 
@@ -104,7 +107,7 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
     whole = pixels.fit(directions)
     channels = [pixels.fit(directions, channel) for channel in range(pixels.values.shape[2])]
     known = [one[0] for one in channels if one is not None]
-    error = np.full(lights, np.inf) if whole is None else _error_by_parts(pixels, directions, whole[0])
+    error = np.full(lights, np.inf) if whole is None else _errors(pixels, directions, whole[0])
     if whole is None or len(known) < len(channels) or not np.isfinite(error).all() or error.max() > MOST_DOUBT:
         raise PsvideoError(
             "This scene does not show how strong the lights are (parts of it differ by more than "
@@ -112,6 +115,18 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
             "thing, a matte sphere (psvideo calibrate matte-sphere) or a white target (flat-field)."
         )
     return Strengths(intensity=np.stack(known, axis=1), error=error, left=whole[1])
+
+
+def _errors(pixels: LitPixels, directions: FloatArray, whole: FloatArray) -> FloatArray:
+    """Return the relative standard errors (light,) of intensities ``whole``: how far they differ between parts of the
+    picture, and with directions that are off by DIRECTIONS_DEG."""
+    by_parts, rng = _error_by_parts(pixels, directions, whole), np.random.default_rng(0)
+    squares = np.zeros(len(whole))
+    for _ in range(TRIALS):
+        turned = directions + rng.normal(0, np.radians(DIRECTIONS_DEG), directions.shape)
+        found = pixels.fit(turned / np.linalg.norm(turned, axis=1, keepdims=True))
+        squares += np.inf if found is None else (found[0] / whole - 1) ** 2
+    return np.asarray(np.hypot(by_parts, np.sqrt(squares / TRIALS)), np.float64)
 
 
 def _error_by_parts(pixels: LitPixels, directions: FloatArray, whole: FloatArray) -> FloatArray:
