@@ -2,7 +2,7 @@
 
 The four weights along either axis, and what four rows make of neighbouring samples, are vectors: one pixel in colour
 takes about thirty instructions. Keys, "Cubic convolution interpolation for digital image processing", 1981, with a
-slope of -0.75, as OpenCV has it.
+slope of -0.75, as OpenCV has it. Why by hand: docs/decisions/cubic-by-vectors.md.
 """
 
 from typing import Any
