@@ -179,6 +179,9 @@ def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> No
     shining[:2] += 0.3 * (np.random.default_rng(1).random(shining[:2].shape[:3]) < 0.02)[..., None]
     of_shining = measure_strengths(light_pictures(pictures.names, list(shining)), directions)
     np.testing.assert_allclose(of_shining.intensity, found.intensity, rtol=0.005)
+    dim = [image * (0.01 if n == 4 else 1.0) for n, image in enumerate(pictures.images)]
+    with pytest.raises(PsvideoError, match=f"Light {pictures.names[4]!r} reaches hardly any"):
+        measure_strengths(light_pictures(pictures.names, dim), directions)
     with pytest.raises(PsvideoError, match="four lights or more"):
         measure_strengths(sphere_pictures(directions[:3], strengths[:3]), directions[:3])
     flat = light_pictures(["a", "b", "c", "d"], [np.full((50, 60), 0.2 * n + 0.1, np.float32) for n in range(4)])

@@ -680,6 +680,14 @@ def test_among_many_lights_those_that_are_not_as_strong_as_the_rig_says_are_name
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_strengths_are_told_beside_a_light_that_is_dead(seed: int) -> None:
+    gains = [1.0, 1.3, 1.0, 0.0, 1.0, 0.75, 1.0, 1.0, 1.0]
+    dead = Footage(shape="waves", lights=9, gains=gains, sheen=(0.2, 12), solved=True).observed(seed)
+    assert any("'light5' 7" in one.found and "'light3'" not in one.found for one in rig_but_leaning(dead))
+    assert "not as strong" in " ".join(one.found for one in result.accuracy(dead))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> None:
     satin = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(seed)
     fit = satin.rig_fit

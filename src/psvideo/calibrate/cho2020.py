@@ -20,8 +20,8 @@ from psvideo.model.camera import FloatArray
 
 LIT, LEAST_REACHED = 0.08, 5
 """A light reaches a pixel that it lights at least this much of its brightest one; so many lights (all of four) must."""
-LEAST_PIXELS, MOST_PIXELS = 300, 4_000
-"""Of so few pixels nothing is measured, and so many are enough."""
+LEAST_PIXELS, LEAST_OF_A_LIGHT, MOST_PIXELS = 300, 100, 4_000
+"""Of so few pixels nothing is measured, nor of a light that reaches so few of them; so many are enough."""
 BLOCKS, FEWEST_OF_A_BLOCK = 4, 20
 """The jackknife leaves out one of this many times this many blocks of the picture, of which so many pixels counted."""
 TURNS, WIDTH = 6, 2.0
@@ -104,13 +104,19 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
             f"Only {len(pixels.used)} pixels are lit by {min(LEAST_REACHED, lights)} lights or more and not saturated; "
             f"expected {LEAST_PIXELS} or more. Use a scene that the lights reach, or expose less."
         )
+    fewest = int(pixels.used.sum(axis=0).argmin())
+    if pixels.used[:, fewest].sum() < LEAST_OF_A_LIGHT:
+        raise PsvideoError(
+            f"Light {pictures.names[fewest]!r} reaches hardly any pixel that others reach (with {LIT:.0%} of the "
+            "brightest light or more). Raise its power or take its picture away, and measure again."
+        )
     whole = pixels.fit(directions)
     channels = [pixels.fit(directions, channel) for channel in range(pixels.values.shape[2])]
     known = [one[0] for one in channels if one is not None]
     error = np.full(lights, np.inf) if whole is None else _errors(pixels, directions, whole[0])
     if whole is None or len(known) < len(channels) or not np.isfinite(error).all() or error.max() > MOST_DOUBT:
         raise PsvideoError(
-            "This scene does not show how strong the lights are (parts of it differ by more than "
+            "This scene does not show how strong the lights are (it leaves a doubt of more than "
             f"{MOST_DOUBT:.0%}): it faces too few ways, shines, or the rig's directions are wrong. Use a matte round "
             "thing, a matte sphere (psvideo calibrate matte-sphere) or a white target (flat-field)."
         )

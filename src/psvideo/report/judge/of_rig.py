@@ -19,7 +19,7 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     """Judge whether the rig's directions and strengths can have made these plates. ``guessed``: which light is which
     is a guess; ``curve_doubt``: why pictures were likely coded by another curve, where that is known."""
     fit = observed.rig_fit
-    firing = [light for light, fires in zip(observed.lights, observed.firing, strict=True) if fires]
+    firing = observed.firing_lights
     said = Judgement(subject="rig", grade="doubtful", found=_sentence(curve_doubt)) if curve_doubt else None
     curve = said or (None if fit is None else other_curve(fit))
     wrong = None if fit is None or curve else rig_misfits(firing, fit)

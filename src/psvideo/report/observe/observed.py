@@ -197,6 +197,11 @@ class Observed:
         return np.asarray(usual >= NOT_FIRING * usual.max(), np.bool_)
 
     @property
+    def firing_lights(self) -> tuple[str, ...]:
+        """The names of the lights that give light, in the order of a rig fit's."""
+        return tuple(light for light, fires in zip(self.lights, self.firing, strict=True) if fires)
+
+    @property
     def rig_fit(self) -> RigFit | None:
         """What the points say of the rig so far, by the lights that fire; None where it cannot be said."""
         return None if self.points is None else self.points.fit(self.light_at_points, self.firing)

@@ -11,8 +11,9 @@ from psvideo.calibrate.cho2020 import LEAST_REACHED, fitted
 from psvideo.model.camera import FloatArray
 
 SHADOW = 0.1
-"""A light reaches a point that gets this share of the brightest one's from it."""
-LEAST_POINTS, MOST_POINTS = 200, 800
+"""A light reaches a point that gets this share of the brightest one's from it, by what the rig sends."""
+LEAST_POINTS, MOST_POINTS = 100, 800
+"""Of fewer, under every light, nothing is said; so many are enough."""
 FEWEST_LIGHTS = 8
 """Under fewer, strengths explain too much: of 16 right sets of five lights 4 came out as wrong, of six 2, of 45 sets of
 8 to 12 none; and of six lights of which one is off, another was named in every third set."""
@@ -32,15 +33,18 @@ class LampStrengths:
 
 def lamp_strengths(light: FloatArray, vectors: FloatArray) -> LampStrengths | None:
     """Return the strengths that explain points best: ``light`` (point, light), 0 where it is not known, and
-    ``vectors`` (point or 1, light, 3), what the rig sends there. None under fewer than FEWEST_LIGHTS, or where too few
-    points say something."""
-    used = (light > SHADOW * light.max(axis=1, keepdims=True)) & (light > 0)
+    ``vectors`` (point or 1, light, 3), what the rig sends there. None under fewer than FEWEST_LIGHTS, or where
+    a light reaches too few points."""
+    even = light / np.maximum(np.linalg.norm(vectors, axis=2), 1e-12)
+    used = (even > SHADOW * even.max(axis=1, keepdims=True)) & (light > 0)
     enough = np.flatnonzero(used.sum(axis=1) >= LEAST_REACHED)
     if light.shape[1] < FEWEST_LIGHTS or len(enough) < LEAST_POINTS:
         return None
     some = enough[np.linspace(0, len(enough) - 1, min(len(enough), MOST_POINTS)).astype(np.intp)]
     unit = light[some] / np.linalg.norm(light[some], axis=1, keepdims=True)
     sent = np.broadcast_to(vectors if len(vectors) == 1 else vectors[some], (len(some), *vectors.shape[1:]))
+    if used[some].sum(axis=0).min() < LEAST_POINTS:
+        return None
     as_told = fitted(unit, sent, used[some], free=False)
     freely = fitted(unit, sent, used[some], free=True)
     if as_told is None or freely is None:
