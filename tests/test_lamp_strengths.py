@@ -52,13 +52,9 @@ def test_of_few_lights_or_points_nothing_is_said(lights: int, points: int) -> No
     assert lamp_strengths(light[:points], sent) is None
 
 
-def test_a_light_that_the_rig_calls_weak_is_measured_and_one_that_reaches_nothing_ends_it() -> None:
+def test_of_a_light_that_reaches_hardly_anything_nothing_is_said() -> None:
     light, sent = scene(8, near=False, seed=0)
-    weak = np.where(np.arange(8) == 5, 0.03, 1.0)
-    found = lamp_strengths(light * weak, sent * weak[:, None])
-    assert found is not None
-    np.testing.assert_allclose(found.ratios, TRUE[:8] / np.median(TRUE[:8]), rtol=0.02)
-    assert lamp_strengths(light * weak, sent) is None
+    assert lamp_strengths(light * np.where(np.arange(8) == 5, 0.03, 1.0), sent) is None
 
 
 def test_what_no_strengths_explain_has_none() -> None:

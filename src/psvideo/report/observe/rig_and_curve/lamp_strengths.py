@@ -11,7 +11,7 @@ from psvideo.calibrate.cho2020 import LEAST_REACHED, fitted
 from psvideo.model.camera import FloatArray
 
 SHADOW = 0.1
-"""A light reaches a point that gets this share of the brightest one's from it, by what the rig sends."""
+"""A light reaches a point that gets this share of the brightest one's from it."""
 LEAST_POINTS, MOST_POINTS = 100, 800
 """Of fewer, under every light, nothing is said; so many are enough."""
 FEWEST_LIGHTS = 8
@@ -35,8 +35,7 @@ def lamp_strengths(light: FloatArray, vectors: FloatArray) -> LampStrengths | No
     """Return the strengths that explain points best: ``light`` (point, light), 0 where it is not known, and
     ``vectors`` (point or 1, light, 3), what the rig sends there. None under fewer than FEWEST_LIGHTS, or where
     a light reaches too few points."""
-    even = light / np.maximum(np.linalg.norm(vectors, axis=2), 1e-12)
-    used = (even > SHADOW * even.max(axis=1, keepdims=True)) & (light > 0)
+    used = (light > SHADOW * light.max(axis=1, keepdims=True)) & (light > 0)
     enough = np.flatnonzero(used.sum(axis=1) >= LEAST_REACHED)
     if light.shape[1] < FEWEST_LIGHTS or len(enough) < LEAST_POINTS:
         return None
