@@ -120,8 +120,8 @@ def turning(time_s: float, shape: tuple[int, int] = (128, 160)) -> np.ndarray:
     return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True), np.float64)
 
 
-def test_a_bare_board_that_turns_out_of_a_lamps_shadow_is_as_bright_under_it_as_a_blend() -> None:
-    """Before the instant the fourth lamp does not reach it, and the later plate is too bright by a fifth."""
+def of_board(how: Aligning) -> tuple[np.ndarray, np.ndarray]:
+    """The fourth lamp's plate, before which it does not reach the board, and by how much normals are off."""
     names, rng, plates = tuple("abcde"), np.random.default_rng(5), []
     albedo = np.full((128, 160), 0.6)
     albedo *= 1 + 0.3 * np.sin(np.arange(160) / 2) * np.sin(np.arange(128) / 3)[:, None]
@@ -134,16 +134,28 @@ def test_a_bare_board_that_turns_out_of_a_lamps_shadow_is_as_bright_under_it_as_
             seen = np.ones(len(light), np.bool_)
             plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))
     lit = Illumination(directions=FIVE, intensities=np.full((5, 1), 0.9), names=names)
+    one = list(aligned(plates, names, how, first=1))[1]
+    moves = None if one.motion is None else one.motion.moves
+    surface = Solving(error=True).solve([p.image for p in one.plates], lit, unsure=one.unsure, moves=moves)
+    return one.plates[3].image, angles_deg(surface.normals, turning(0.0))
 
-    def shown(how: Aligning) -> tuple[float, float]:
-        one = list(aligned(plates, names, how, first=1))[1]
-        moves = None if one.motion is None else one.motion.moves
-        surface = Solving(error=True).solve([p.image for p in one.plates], lit, unsure=one.unsure, moves=moves)
-        off_deg = angles_deg(surface.normals, turning(0.0))
-        return float(one.plates[3].image[BOARD].mean()), float(off_deg[BOARD].mean())
 
+def test_a_bare_board_that_turns_out_of_a_lamps_shadow_is_as_bright_under_it_as_a_blend() -> None:
+    """Before the instant the fourth lamp does not reach it, and the later plate is too bright by a fifth."""
     true = 0.54 * float(turning(0.0)[BOARD][0, 0] @ FIVE[3])
-    (light, off_deg), (nearest, plain_deg) = shown(Aligning()), shown(UNALIGNED)
+    (plate, off_deg), (plain, plain_deg) = of_board(Aligning()), of_board(UNALIGNED)
+    light, nearest = float(plate[BOARD].mean()), float(plain[BOARD].mean())
     assert nearest > 1.2 * true
     assert true < light < true + 0.5 * (nearest - true)
-    assert off_deg < 0.4 * plain_deg
+    assert off_deg[BOARD].mean() < 0.4 * plain_deg[BOARD].mean()
+
+
+def test_what_turns_is_blended_up_to_the_edge_of_its_face() -> None:
+    """Beside its edge a wide window holds the wall as well, which did not change."""
+    inner, beside = np.zeros((2, 128, 160), np.bool_)
+    inner[40:88, 50:110] = True
+    beside[33:95, 43:117] = True
+    beside &= ~inner
+    (_, off_deg), (_, plain_deg) = of_board(Aligning()), of_board(UNALIGNED)
+    assert plain_deg[beside].mean() > 0.9 * plain_deg[inner].mean()
+    assert off_deg[beside].mean() < 1.3 * off_deg[inner].mean()

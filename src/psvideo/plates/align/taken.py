@@ -38,8 +38,9 @@ BLENDED, BLENDED_UNLIKE, BLENDED_ALIKE = np.float32(0.25), np.float32(0.8), np.f
 would be; by what their detail differs, by a shadow, or by more than is even, only a little less, and half where plates
 are alike: edges lie a part of a pixel beside each other there."""
 REST = 3.0
-"""What stands still while its shading changes by more codes is blended by time, and where one of the two plates is in
-shadow as well: a face that turns to a lamp is as bright as the blend or darker, and darker than the later plate."""
+"""What stands still while its shading changes by more codes is blended by time, up to the edge of its face, and where
+one of the two plates is in shadow as well: a face that turns to a lamp is as bright as the blend or darker, and darker
+than the later plate."""
 ENOUGH = 4
 """Where this many lights are sure, other lights are left out unless they are sure as well."""
 MANY = 4
@@ -49,7 +50,7 @@ FEWEST = 3
 degrees where the plates as they are were off by 19 (a bust that tumbles by 8 px from flash to flash)."""
 APART_PX = 1.0
 """What moves by so much more or less from plate to plate moves by itself, and may hide other things."""
-HALF = np.float32(0.5)
+HALF, LEAST = np.float32(0.5), np.float32(1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +87,8 @@ def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
     nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
     source = np.where(motion.moves, np.where(own_unlike < np.float32(TURNED**2), BOTH, nearer), AT_REST)
     source = source.astype(np.uint8)
-    source[~motion.moves & evenly & (np.abs(shading) > REST)] = BOTH
+    turns = _turns((shading, evenly & ~motion.moves), (own_shading, own_evenly), wide)
+    source[~motion.moves & turns] = BOTH
     if guessed:
         source[~motion.moves & (np.abs(apart) > REST)] = BOTH
     gone = [_outside(way) for way in ways]
@@ -105,6 +107,20 @@ def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
         unsure=unsure,
         shows=InstantSketch(codes=_shown(before, after, source, spans_s), white=pair.before.white, noise=noise),
     )
+
+
+def _turns(whole: tuple[Vectors, Flags], own: tuple[Vectors, Flags], window: tuple[int, int]) -> Flags:
+    """Return what turns where it stands: it changes evenly over a whole window, or on its own side of an edge, and by
+    as much as what does so around it. Both are by how much plates differ, and where evenly.
+
+    What changes by another amount than its surroundings is what an edge passed.
+    """
+    shading, evenly = whole
+    even = evenly.astype(np.float32)
+    share = np.asarray(cv2.blur(even, window), np.float32)
+    around = np.asarray(cv2.blur(shading * even, window), np.float32) / np.maximum(share, LEAST)
+    beside = own[1] & (share > LEAST) & (np.abs(own[0] - around) < np.float32(BARE))
+    return np.asarray(np.abs(np.where(beside, own[0], np.where(evenly, shading, 0))) > np.float32(REST))
 
 
 def _alike(shading: Vectors, unlike: Vectors) -> Flags:
@@ -127,7 +143,7 @@ def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags
     a whole, and ``unlike`` the square of what their detail does."""
     level, unlike = shading * shading, np.maximum(unlike, np.float32(0))  # sums that run along rows round
     detail = np.where(alike, BLENDED_ALIKE, BLENDED_UNLIKE)
-    squares = (BLENDED**2 * level + detail**2 * unlike) / np.maximum(level + unlike, np.float32(1e-6))
+    squares = (BLENDED**2 * level + detail**2 * unlike) / np.maximum(level + unlike, LEAST)
     plain = shaded | (np.abs(shading) > EVENLY)
     return np.asarray(np.where(plain & ~alike, BLENDED_UNLIKE, np.sqrt(squares)), np.float32)
 
