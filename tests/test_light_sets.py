@@ -5,10 +5,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import ExifTags, Image, PngImagePlugin
 
 from psvideo.calibrate.light_files import find_plates, find_stills
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.cli.app import main
+from psvideo.clip.stills import look_at
 from psvideo.errors import PsvideoError
 from psvideo.runs.photographs.light_sets import Reading, open_light_sets, read_images
 
@@ -153,3 +155,59 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
     still(tmp_path / "sizes" / "b.png", 0.1, (6, 9))
     with pytest.raises(PsvideoError, match="one camera"):
         mean_pictures(tmp_path / "sizes")
+
+
+PORTRAIT = 6
+"""EXIF's orientation of a camera that was held upright: the first row is the right-hand side."""
+
+
+def photograph(path: Path, image: "np.ndarray[tuple[int, ...], np.dtype[np.uint8]]", orientation: int = 1) -> None:
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(image).save(path, exif=exif)
+
+
+@pytest.mark.parametrize("ending", ["png", "jpg", "tif"])
+def test_photographs_are_turned_upright_as_their_files_say(ending: str, tmp_path: Path) -> None:
+    lying = np.zeros((40, 64, 3), np.uint8)
+    lying[:20, 32:] = 250  # top right as the sensor lay: bottom right of the picture
+    for name in ("key", "left", "ambient", "room"):
+        photograph(tmp_path / f"{name}.{ending}", lying if name != "ambient" else lying // 5, PORTRAIT)
+    opened = open_light_sets(tmp_path)
+    found = mean_of_sets(opened.sets)
+    assert found.images.shape == (2, 64, 40, 3)
+    assert found.ambient is not None
+    assert opened.room is not None
+    for picture in (found.images[0], found.ambient, opened.room):
+        assert picture[48, 30].min() > 0.02 > picture[16, 30].max()
+        assert picture[48, 10].max() < 0.02
+
+
+def test_photographs_that_lie_in_other_ways_are_not_of_one_place(tmp_path: Path) -> None:
+    square = np.full((32, 32, 3), 90, np.uint8)
+    photograph(tmp_path / "key.png", square)
+    photograph(tmp_path / "left.png", square, PORTRAIT)
+    with pytest.raises(PsvideoError, match=r"turned by 90 degrees clockwise, and .*key\.png is 32 x 32 pixels"):
+        read_images(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "says", "curve"),
+    [("key.png", None, "srgb"), ("key.jpg", None, "srgb"), ("key.png", 1.0, "linear"), ("key.png", 1 / 1.8, "gamma18")],
+)
+def test_photographs_are_read_by_the_curve_that_their_files_name(
+    name: str, says: float | None, curve: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The same as ``stills`` reads them by: calibration and results see the same light."""
+    chunks = PngImagePlugin.PngInfo()
+    if says is not None:
+        chunks.add(b"gAMA", round(says * 100000).to_bytes(4, "big"))
+    for light in ("key", "left"):
+        path = tmp_path / name.replace("key", light)
+        Image.fromarray(np.full((16, 16), 128, np.uint8)).save(path, **({"pnginfo": chunks} if says else {}))
+    with caplog.at_level("DEBUG", logger="psvideo"):
+        found = read_images(tmp_path)
+    assert found.images[0, 8, 8] == pytest.approx(read_images(tmp_path, transfer=curve).images[0, 8, 8])
+    assert look_at(sorted(tmp_path.iterdir())).transfer == curve
+    assert f"the pictures are read as {curve!r}" in caplog.text

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import demosaic, parse_range
-from psvideo.clip.decode.decoders import decode
+from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.clip.linear import linear_light
 from psvideo.clip.reading import looks
-from psvideo.clip.transfer import usual_transfer
+from psvideo.clip.stated import stated_by
+from psvideo.clip.stated_curve import curve_of_pictures
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.channels import mean_of_channels
@@ -174,10 +175,14 @@ class LightFiles:
         """How many pictures there are of each light."""
         return min(len(files) for files in self.by_light.values())
 
-    @property
-    def usual_transfer(self) -> str:
-        """The name of the curve by which such pictures code light where nobody says."""
-        return usual_transfer(KINDS[next(iter(self.by_light.values()))[0].suffix.lower()])
+    def curve(self) -> tuple[str, str]:
+        """Return the name of the curve by which the first picture of every light codes light, and why.
+
+        Raises PsvideoError where one cannot be read, or where they say different things.
+        """
+        first = [paths[0] for paths in self.by_light.values()]
+        kind = KINDS[first[0].suffix.lower()]
+        return curve_of_pictures(first, kind, read_header(kind, first[0]), [stated_by(file) for file in first])
 
 
 def read_sets(
@@ -213,7 +218,8 @@ def read_sets(
 
 
 def read_picture(path: Path, encoding: Encoding = Encoding()) -> tuple[NDArray[np.float32], str]:
-    """Return a picture in linear light, (row, col) or (row, col, 3), and its size, channels and depth in words.
+    """Return a picture in linear light, (row, col) or (row, col, 3), upright as its file says that it lies, and its
+    size, channels and depth in words.
 
     Raises PsvideoError where it cannot be read.
     """
@@ -224,4 +230,6 @@ def read_picture(path: Path, encoding: Encoding = Encoding()) -> tuple[NDArray[n
     if not np.isfinite(image).all():
         raise PsvideoError(f"{path}: holds values that are no numbers (NaN or infinity). Write it again.")
     cfa = picture.header.cfa
-    return (image if cfa is None else demosaic(image, cfa)), looks(picture.header)
+    turn = stated_by(path).turn if picture.header.turn.is_none else picture.header.turn
+    said = looks(picture.header) if turn.is_none else f"{looks(picture.header)}, {turn}"
+    return turn.upright(image if cfa is None else demosaic(image, cfa)), said

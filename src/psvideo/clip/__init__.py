@@ -5,8 +5,8 @@ curve and gives one frame after the other. ``keeping_near`` keeps decoded frames
 colour of a mosaic.
 
 - records: ``record`` (a clip), ``take`` (a clip and the frames that are used)
-- finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves) and
-  ``filters`` (whether they are a mosaic)
+- finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves),
+  ``stated_curve`` (by which curve they code light) and ``filters`` (whether they are a mosaic)
 - reading: ``reading``, ``transfer`` and ``linear`` (from codes to light), ``in_file`` and ``kept`` (codes that are not
   in memory)
 

@@ -74,9 +74,14 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
 
 
 def _tagged(sequence: NumberedImages, header: Header) -> Header:
-    """Return the header with the curve that the first file's profile or chunks name, where the decoder found none."""
-    said = stated_by(sequence.files[0]).transfer if sequence.kind in PROFILED else None
-    return header if header.transfer or said in (None, "unknown") else replace(header, transfer=said)
+    """Return the header with the curve that the first file's profile or chunks name, and how it says that it lies,
+    where the decoder found none."""
+    if sequence.kind not in PROFILED:
+        return header
+    said = stated_by(sequence.files[0])
+    curve = None if said.transfer == "unknown" else said.transfer
+    turn = said.turn if header.turn.is_none else header.turn
+    return replace(header, transfer=header.transfer or curve, turn=turn)
 
 
 def _open_movie(path: Path, plan_path: Path | None) -> Clip:

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import decode, read_header
-from psvideo.clip.folder import KINDS, RAWS
+from psvideo.clip.folder import KINDS
 from psvideo.clip.reading import looks
 from psvideo.clip.record import Clip, Header, shot_of
 from psvideo.clip.stated import Stated, stated_by
-from psvideo.clip.transfer import LOGARITHMIC, find_curve
+from psvideo.clip.stated_curve import curve_of_pictures
+from psvideo.clip.transfer import find_curve
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
@@ -100,7 +101,7 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
     stated = tuple(replace(_stated(kind, file), longer_px=longer_px) for file in files)
     _refuse_odd(files, [looks(header) for header in headers], "is")
     _refuse_odd(files, [str(one.turn) for one in stated], "lies")
-    name, because = (transfer, "as you say") if transfer else _transfer(files, kind, headers[0], stated)
+    name, because = (transfer, "as you say") if transfer else curve_of_pictures(files, kind, headers[0], stated)
     find_curve(name)
     header = headers[0] if headers[0].turn != UPRIGHT else replace(headers[0], turn=stated[0].turn)
     white, brightest = _white_beyond(kind, files) if header.bits is None else (None, 0.0)
@@ -162,34 +163,3 @@ def _refuse_odd(files: Sequence[Path], facts: Sequence[str], verb: str) -> None:
             f"{files[odd]}: {verb} {facts[odd]}, and {like.name} {verb} {usual}. Expected pictures of one camera in "
             "one place and one mode: take this one again, export it like the others, or move it elsewhere."
         )
-
-
-def _transfer(files: Sequence[Path], kind: str, header: Header, stated: Sequence[Stated]) -> tuple[str, str]:
-    """Return the curve of the pictures, and why: what they say, else what is usual for their kind."""
-    named = [one.transfer or "" for one in stated]
-    odd = next((place for place, name in enumerate(named) if name != named[0]), None)
-    if odd is not None:
-        raise PsvideoError(
-            f"{files[odd]}: says that its curve is {named[odd] or 'nothing in particular'} "
-            f"({stated[odd].by or 'no profile'}), and {files[0].name} {named[0] or 'says nothing'} "
-            f"({stated[0].by or 'no profile'}). Pictures with different curves cannot be compared: export them all "
-            "alike, or say with `transfer` what holds for all."
-        )
-    if named[0] == "unknown":
-        raise PsvideoError(
-            f"{files[0]}: {stated[0].by} has a curve that psvideo does not know. Export the pictures as sRGB or "
-            "linear, or say with `transfer` which curve comes nearest."
-        )
-    if header.transfer == LOGARITHMIC:
-        raise PsvideoError(
-            f"{files[0]}: says that it holds a logarithm of light, and not which. Say with `transfer` which curve it "
-            "is, such as slog3 or logc3, or export the pictures as linear."
-        )
-    if header.transfer:
-        return header.transfer, "as their header says"
-    if named[0] and kind not in RAWS:
-        return named[0], f"as {stated[0].by} says"
-    if header.bits == 8:
-        return "srgb", "the usual curve of 8-bit pictures: they say nothing themselves"
-    depth = f"{header.bits} bits" if header.bits else "floating point"
-    return "linear", f"the usual meaning of {kind.upper()} pictures of {depth}: they say nothing themselves"

@@ -192,15 +192,6 @@ def _letters(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("curve")
 
 
-def usual_transfer(kind: str) -> str:
-    """Return the name of the curve by which files of a kind code light where nobody says: only JPEG has one of its own.
-
-    >>> usual_transfer("jpeg"), usual_transfer("png")
-    ('srgb', 'linear')
-    """
-    return "srgb" if kind == "jpeg" else "linear"
-
-
 def disagreement(named: str, *, tagged: str | None, kind: str) -> str | None:
     """Say where the curve that a plan names cannot be the one that the files were coded with; None where it may be.
 

@@ -64,8 +64,8 @@ class Reading:
     """How pictures of lights are to be read.
 
     ``plan`` names the plan where none lies beside the pictures; ``frames`` chooses file numbers of a clip, or sets
-    counted from 1; ``transfer`` says how stills code light (left out: as the plan says; without a plan sRGB for JPEG,
-    else linear).
+    counted from 1; ``transfer`` says how stills code light (left out: as the plan says; without a plan as the files do,
+    else sRGB for 8 bits, and linear for more).
     """
 
     plan: Path | None = None
@@ -82,13 +82,13 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
     ----------
     path
         A folder of still photographs, one per light, in the order of their names (L2 before L10): PNG, TIFF, EXR, DNG,
-        DPX or JPEG. A picture named ambient or dark shows the scene with every light off and is taken off the others;
-        those named room or mask are left aside, and so is one of another name beside many numbered ones: the
-        log (``psvideo``) names what was. Or a folder with one folder of pictures per light, as ``split`` writes it, or
+        DPX or JPEG, turned upright as EXIF says that they lie. A picture named ambient or dark shows the scene with
+        every light off and is taken off the others; those named room or mask are left aside, and so is one of another
+        name beside many numbered ones: the log (``psvideo``) names what was. Or a folder with one folder of pictures per light, as ``split`` writes it, or
         a clip, whose flashes are found first; of these, the mean over up to twelve rounds.
     transfer
         How the files code light: "linear", "srgb", "rec709", "slog3" and others by OpenColorIO's names. Left out: as
-        the plan says; without a plan sRGB for JPEG, else linear.
+        the plan says; without a plan as the files do, else sRGB for 8 bits, and linear for more. The log says which.
     plan
         The plan, where it does not lie beside the pictures: names the lights, and says how the files code light.
 
@@ -130,7 +130,7 @@ def open_photographs(place: Place, reading: Reading) -> LightSets:
     files = find_stills(place.files)
     renamed = {place.names.get(found[0], light): found for light, found in files.by_light.items()}
     files = replace(files, by_light=renamed)
-    return _of_files(files, Encoding(transfer=files.usual_transfer), reading)
+    return _of_files(files, None, reading)
 
 
 def _in_runs(images: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -176,8 +176,7 @@ def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = 
     plan = None if plan_path is None else read_plan(plan_path)
     lights = () if plan is None else plan.lights
     files = find_plates(path, lights=lights) or find_stills(path, lights=lights)
-    encoding = Encoding(transfer=files.usual_transfer) if plan is None else plan.camera.encoding
-    return _of_files(files, encoding, reading)
+    return _of_files(files, None if plan is None else plan.camera.encoding, reading)
 
 
 def _is_clip(path: Path, plan_path: Path) -> bool:
@@ -189,18 +188,25 @@ def _is_clip(path: Path, plan_path: Path) -> bool:
     return not lights <= stems
 
 
-def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightSets:
-    transfer = reading.transfer or encoding.transfer
-    notes = []
+def _of_files(files: LightFiles, planned: Encoding | None, reading: Reading) -> LightSets:
+    """Return pictures as sets; ``planned`` is how they code light where a plan says it."""
+    read, notes = _encoding(files, planned, reading.transfer)
     aside = tuple(f"{file}: is assumed to be no light's picture and left aside" for file in files.left_aside)
-    if reading.transfer is None and files.usual_transfer != "linear":
-        notes.append(f"the pictures are read by the curve {transfer!r}; `transfer` names another")
-    read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
     room = None if files.room is None else read_picture(files.room, read)[0]
     return LightSets(
-        name=files.folder.resolve().name, names=files.names, sets=sets, room=room, warnings=aside, notes=tuple(notes)
+        name=files.folder.resolve().name, names=files.names, sets=sets, room=room, warnings=aside, notes=notes
     )
+
+
+def _encoding(files: LightFiles, planned: Encoding | None, transfer: str | None) -> tuple[Encoding, tuple[str, ...]]:
+    """Return how pictures are read, and what to say of it: as somebody says, as the plan does, else as they do."""
+    if planned is not None:
+        return replace(planned, transfer=transfer or planned.transfer), ()
+    if transfer is not None:
+        return Encoding(transfer=transfer), ()
+    curve, because = files.curve()
+    return Encoding(transfer=curve), (f"the pictures are read as {curve!r}, {because}; `transfer` names another curve",)
 
 
 def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
