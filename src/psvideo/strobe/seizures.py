@@ -1,6 +1,6 @@
 """What eyes make of a plan: how often each light, the round and the whole scene flash, and which of it is dangerous.
 
-Light that flashes at 3 to 65 Hz can cause seizures in photosensitive people (IEEE 1789-2015; docs/shoot.md).
+Light that flashes at 3 to 70 Hz can cause seizures in photosensitive people (IEEE 1789-2015; docs/shoot.md).
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Rate:
 
     @property
     def is_dangerous(self) -> bool:
-        """True between 3 and 65 Hz."""
+        """True between 3 and 70 Hz."""
         return SEIZURE_HZ[0] <= self.hz <= SEIZURE_HZ[1]
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from psvideo.model.plan import Plan, PlannedFlash
 
-SEIZURE_HZ = (3.0, 65.0)
-"""Flashes at these rates can harm people with photosensitive epilepsy (about 3 to 70 Hz: IEEE 1789-2015)."""
+SEIZURE_HZ = (3.0, 70.0)
+"""Flashes at these rates can harm people with photosensitive epilepsy (IEEE 1789-2015)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ A set whose lights are moved or knocked is calibrated again and again; the repor
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -25,10 +25,17 @@ from psvideo.runs.calibrate.matte_sphere import matte_sphere
 from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
 from psvideo.runs.many_takes.cluster import Cluster, connected
 from psvideo.runs.many_takes.handed_out import called_apart
-from psvideo.runs.many_takes.several_takes import names_of
+from psvideo.runs.many_takes.several_takes import names_of, whole_options
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 Calibration = Literal["mirror-sphere", "matte-sphere", "flat-field", "colours", "intensities"]
+RUNS: Mapping[Calibration, Callable[..., object]] = {
+    "mirror-sphere": mirror_sphere,
+    "matte-sphere": matte_sphere,
+    "flat-field": flat_field,
+    "colours": colours,
+    "intensities": intensities,
+}
 
 
 def calibrate_takes(
@@ -68,8 +75,8 @@ def calibrate_takes(
         refuse_existing(rig, force=force, mark=SCHEMA)
         if calibration in ("mirror-sphere", "matte-sphere"):
             refuse_existing(rig.with_suffix(".png"), force=force, mark=PICTURE_MARK)
-    whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
-    one = partial(_measured, calibration=calibration, folder=folder.resolve(), options={**whole, "force": force})
+    whole = {**whole_options(RUNS[calibration], options), "force": force}
+    one = partial(_measured, calibration=calibration, folder=folder.resolve(), options=whole)
     found: dict[Path, RigResult] = {}
     for path, result in _done(one, rigs, Cluster(workers=workers, scheduler=scheduler), watch):
         warnings = tuple(caller.spell(words) for words in result.findings)

@@ -51,7 +51,7 @@ def check_takes(
     check_rigs(rig, paths)
     for path in paths:
         refuse_inside(page, path)
-    plan_path, rig_path = (None if path is None else Path(path) for path in (plan, rig))
+    plan_path, rig_path = (None if path is None else Path(path).resolve() for path in (plan, rig))
     one = partial(_one, plan=plan_path, rig=rig_path, first_light=first_light, caller=caller)
     checks: Iterator[tuple[Path, Check | Unread]] = ((path, one(path)) for path in paths)
     cluster = Cluster(workers=workers, scheduler=scheduler)

@@ -51,7 +51,7 @@ def done_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwa
     faults: dict[int, str] = {}
     futures: list[Future] = []
     for place, take in enumerate(takes):
-        timed = client.submit(do_piece, take, 0, after=None, pure=False, retries=RETRIES)
+        timed = client.submit(do_piece, take, 0, after="", pure=False, retries=RETRIES)
         pieces = [
             client.submit(do_piece, take, number, after=timed, pure=False, retries=RETRIES)
             for number in range(1, take.pieces + 1)
@@ -64,8 +64,9 @@ def done_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwa
         for future in watch(done, total=len(futures), what="solving", unit="pieces"):
             place = place_of[future.key]
             left[place] -= 1
-            if future.status != "finished" and place not in faults:
-                faults[place] = _fault(future)
+            fault = future.result() if future.status == "finished" else _fault(future)
+            if fault:
+                faults.setdefault(place, fault)
             if left[place] == 0:
                 yield place, faults.get(place, "")
 
@@ -127,7 +128,7 @@ def called_apart(
     """
     from distributed import as_completed
 
-    futures = [client.submit(call, value, pure=False, retries=RETRIES) for value in values]
+    futures = [client.submit(_called, call, value, pure=False, retries=RETRIES) for value in values]
     value_of = {future.key: value for future, value in zip(futures, values, strict=True)}
     done = as_completed(futures, loop=client.loop, raise_errors=False)
     with _hanging_replaced(client, value_of):
@@ -135,9 +136,21 @@ def called_apart(
             yield value_of[future.key], future.result() if future.status == "finished" else _fault(future)
 
 
-def do_piece(take: Shared, number: int, *, after: object) -> None:
-    """Do one piece of a take, in a worker. ``after`` is what it waits for."""
-    take.do(number)
+def do_piece(take: Shared, number: int, *, after: str) -> str:
+    """Do one piece of a take, in a worker, and return what is wrong with its footage, or nothing: another try would
+    find the same. ``after`` is what was wrong with the piece that it waited for."""
+    if after:
+        return after
+    fault = _called(take.do, number)
+    return fault if isinstance(fault, str) else ""
+
+
+def _called(call: Callable[[Value], Result], value: Value) -> Result | str:
+    """Return what a function gives, or what PsvideoError says of the footage."""
+    try:
+        return call(value)
+    except PsvideoError as fault:
+        return str(fault)
 
 
 def _fault(future: "Future") -> str:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import AllDoneError, UsageError
+from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.many_takes.cluster import Cluster
-from psvideo.runs.many_takes.several_takes import Given, Takes, all_done
+from psvideo.runs.many_takes.several_takes import Given, Takes, all_done, whole_options
 from psvideo.runs.normals import normals
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.output import rounds_of
@@ -72,7 +72,9 @@ def normals_of_takes(
     if piece is not None:
         raise UsageError("`piece` is solved by one process, of one clip. Leave it out here.")
     cluster = Cluster(workers=workers, scheduler=scheduler)
-    given = Given(cluster=cluster, force=force, resume=resume, options=options, watch=watch, caller=caller)
+    given = Given(
+        cluster=cluster, force=force, resume=resume, options=whole_options(normals, options), watch=watch, caller=caller
+    )
 
     def share(takes: Takes, there: int) -> list[TakeInPieces]:
         counts = [pieces] * len(takes.of) if pieces else _counts(takes, there, options)
@@ -103,8 +105,15 @@ class TakeInPieces:
 
 
 def _counts(takes: Takes, workers: int, options: Mapping[str, Any]) -> Iterator[int]:
-    """Give into how many pieces each take is cut: enough for all workers, and none too short."""
+    """Give into how many pieces each take is cut: enough for all workers, and none too short. One that cannot be opened
+    is one piece, whose worker says why, and does not keep the others."""
     for clip, _ in takes.of:
-        take = open_take(clip, plan=path_if_given("plan", options.get("plan")), frames=options.get("frames"))
+        try:
+            take = open_take(clip, plan=path_if_given("plan", options.get("plan")), frames=options.get("frames"))
+        except UsageError:
+            raise
+        except PsvideoError:
+            yield 1
+            continue
         wanted = -(-4 * workers // len(takes.of))
         yield max(min(wanted, rounds_of(take) // LEAST_ROUNDS), 1)

@@ -4,8 +4,9 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
@@ -79,7 +80,7 @@ def one_by_one(takes: Takes, do: Callable[[Path, Path], object], *, caller: Call
             caller.say(str(done))
         except UsageError:
             raise
-        except PsvideoError as fault:
+        except (PsvideoError, OSError) as fault:
             yield TakeResult(clip=clip, out=place, fault=caller.spell(str(fault)))
             continue
         yield result_of(clip, place)
@@ -87,7 +88,8 @@ def one_by_one(takes: Takes, do: Callable[[Path, Path], object], *, caller: Call
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """How takes are to be done: by whom, over what lies there, and with which other ``options`` of the run."""
+    """How takes are to be done: by whom, over what lies there, and with which other ``options`` of the run, as
+    ``whole_options`` gives them."""
 
     cluster: Cluster
     force: bool
@@ -98,9 +100,17 @@ class Given:
 
     @property
     def of_one(self) -> dict[str, Any]:
-        """The options for one take, with ``force``; workers may run elsewhere, so paths are whole."""
-        whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in self.options.items()}
-        return {**whole, "force": self.force}
+        """The options for one take, with ``force``."""
+        return {**self.options, "force": self.force}
+
+
+def whole_options(run: Callable[..., object], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options of a run in which all paths are whole, also those that are text: workers may run elsewhere."""
+    takes_path = {name for name, one in signature(run).parameters.items() if Path in get_args(one.annotation)}
+    return {
+        name: Path(value).resolve() if name in takes_path and value is not None else value
+        for name, value in options.items()
+    }
 
 
 def all_done(
@@ -161,5 +171,8 @@ def apart(
 
 
 def result_of(clip: Path, out: Path) -> TakeResult:
-    """Return what the report of a take's folder says."""
-    return TakeResult.of(clip, out, json.loads((out / "report.json").read_text(encoding="utf-8")))
+    """Return what the report of a take's folder says, or that it cannot be read."""
+    try:
+        return TakeResult.of(clip, out, json.loads((out / "report.json").read_text(encoding="utf-8")))
+    except (OSError, ValueError) as fault:
+        return TakeResult(clip=clip, out=out, fault=f"{out / 'report.json'}: cannot be read ({fault}). Run it again.")

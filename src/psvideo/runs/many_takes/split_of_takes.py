@@ -9,7 +9,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.many_takes.cluster import Cluster
-from psvideo.runs.many_takes.several_takes import Given, Takes, all_done
+from psvideo.runs.many_takes.several_takes import Given, Takes, all_done, whole_options
 from psvideo.runs.split import split
 from psvideo.runs.steps.caller import PYTHON, Caller
 
@@ -59,7 +59,9 @@ def split_of_takes(
     [('take3', '', 3)]
     """
     cluster = Cluster(workers=workers, scheduler=scheduler)
-    given = Given(cluster=cluster, force=force, resume=resume, options=options, watch=watch, caller=caller)
+    given = Given(
+        cluster=cluster, force=force, resume=resume, options=whole_options(split, options), watch=watch, caller=caller
+    )
 
     def share(takes: Takes, _: int) -> list[TakeWhole]:
         return [TakeWhole(clip=clip.resolve(), out=place.resolve(), options=given.of_one) for clip, place in takes.of]

@@ -84,8 +84,9 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
         A folder of still photographs, one per light, in the order of their names (L2 before L10): PNG, TIFF, EXR, DNG,
         DPX or JPEG, turned upright as EXIF says that they lie. A picture named ambient or dark shows the scene with
         every light off and is taken off the others; those named room or mask are left aside, and so is one of another
-        name beside many numbered ones: the log (``psvideo``) names what was. Or a folder with one folder of pictures per light, as ``split`` writes it, or
-        a clip, whose flashes are found first; of these, the mean over up to twelve rounds.
+        name beside many numbered ones: the log (``psvideo``) names what was. Or a folder with one folder of pictures
+        per light, as ``split`` writes it, or a clip, whose flashes are found first; of these, the mean over up to
+        twelve rounds.
     transfer
         How the files code light: "linear", "srgb", "rec709", "slog3" and others by OpenColorIO's names. Left out: as
         the plan says; without a plan as the files do, else sRGB for 8 bits, and linear for more. The log says which.
