@@ -329,6 +329,11 @@ def test_instants_that_no_two_cameras_share_are_refused(tmp_path: Path, make_pla
         rate_of("24", plan, resync=path, clip="C")
     with pytest.raises(UsageError, match="Add `fps`"):
         rate_of("frame", plan, resync=path, clip="B")
+    record = json.loads(format_clocks(clocks))
+    path.write_text(json.dumps({**record, "cameras": record["cameras"][::-1]}), encoding="utf-8")
+    with pytest.raises(PsvideoError, match="the reference is 'A', and the first camera 'B'"):
+        read_clocks(path)
+    path.write_text(format_clocks(clocks), encoding="utf-8")
     path.write_text(path.read_text(encoding="utf-8").replace('"rate_ppm": 41.0', '"rate_ppm": "41"'), encoding="utf-8")
     with pytest.raises(PsvideoError, match=r"clocks\.json: .*rate_ppm"):
         read_clocks(path)

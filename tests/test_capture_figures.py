@@ -165,6 +165,14 @@ def test_light_blur_and_duty_of_unequal_flashes() -> None:
     assert figures.motion_per_flash_px == pytest.approx(300 * round_s)
 
 
+def test_a_row_receives_no_more_than_its_exposure_holds() -> None:
+    """Below 360 degrees, and synced, a flash may be longer than the exposure."""
+    camera = Camera(width_px=4, height_px=4, fps=Fraction(100), exposure_s=0.005, readout_s=0.0)
+    plan = Plan(camera=camera, flashes=paper_plan(20e-3).flashes, dark_s=0.0, mode="synced")
+    slot = shoot_figures(plan).slots[0]
+    assert (slot.light_share, slot.stops) == (1.0, 0.0)
+
+
 def test_rare_dark_slots_cost_their_share_of_the_rate() -> None:
     never = shoot_figures(paper_plan(1e-3, 1e-3, 1e-3))
     always = shoot_figures(paper_plan(1e-3, 1e-3, 1e-3, dark_slot_s=1e-3))

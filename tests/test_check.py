@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from picture_file import read_picture
 from psvideo.cli.app import main
 from psvideo.report.observe.focus import sharpest_blur_px
 from psvideo.runs.many_takes.arriving import takes_in, whole_takes
+from psvideo.runs.steps.checked import Check
 
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
 SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")
@@ -293,6 +294,20 @@ def test_several_takes_are_checked_and_one_that_cannot_be_read_does_not_keep_the
     assert "nothing: cannot be checked yet" in said
     assert "2 takes checked: 1 usable, 0 not, 1 could not be read." in said
     assert "nothing" in page.read_text(encoding="utf-8")
+
+
+def test_a_check_of_several_takes_that_is_stopped_is_no_pass(
+    shot: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(clips: list[Path], **_: object) -> Iterator[Check]:
+        yield Check(clip="good", path=clips[0], frames=9, looked_at=9, seconds=1.0, judgements=())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("psvideo.runs.many_takes.check_folder.check_takes", stopped)
+    assert run("check", shot("good"), shot("good").parent / "other") == 1
+    said = capsys.readouterr()
+    assert "good: This take is usable" in said.out
+    assert "stopped" in said.err
 
 
 def test_watching_reports_every_take_and_ends_well_with_ctrl_c(shot: Callable[[str], Path], tmp_path: Path) -> None:

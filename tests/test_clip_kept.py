@@ -83,6 +83,20 @@ def test_a_write_that_takes_only_a_part_is_gone_on_with(tmp_path: Path) -> None:
         assert np.array_equal(kept.get(3).codes, codes)
 
 
+def test_a_reading_that_gives_only_a_part_is_gone_on_with(tmp_path: Path) -> None:
+    """Linux gives 2 GiB at a time."""
+
+    class Slow(io.FileIO):
+        def readinto(self, room: memoryview) -> int:  # type: ignore[override]
+            return super().readinto(room[:7]) or 0
+
+    codes = np.arange(100, dtype=np.uint16).reshape(10, 10)
+    with Slow(str(tmp_path / "file"), "w+") as file:
+        kept = Kept(file, most_bytes=10**6)
+        kept.put(3, picture(codes))
+        assert np.array_equal(kept.get(3).codes, codes)
+
+
 def test_a_picture_that_the_disk_does_not_give_back_is_said(tmp_path: Path) -> None:
     with io.FileIO(str(tmp_path / "file"), "w+") as file:
         kept = Kept(file, most_bytes=10**6)

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from PIL import Image
 
 from psvideo import __version__
 from psvideo.compute.halves import halves_of
@@ -22,7 +23,7 @@ from psvideo.compute.threads import writing
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.export.sequences.planes import ones_of
 from psvideo.export.sequences.plate_files import write_flash, write_plate
-from psvideo.export.sequences.png_maps import decode_normals, encode_normals
+from psvideo.export.sequences.png_maps import decode_normals, encode_normals, write_png16
 from psvideo.export.sequences.result_files import Delivery, is_written, write_surface
 from psvideo.export.sequences.tags import Tags, advanced
 from psvideo.export.space import Space, choose_space, placed
@@ -353,3 +354,12 @@ def test_every_compression_is_without_loss(tmp_path: Path, compression: Compress
     read = OpenEXR.File(str(tmp_path / "noisy.exr"), separate_channels=True)
     np.testing.assert_array_equal(read.channels()["Y"].pixels, noisy)
     assert str(read.header()["compression"]).lower().startswith(f"compression.{compression.replace('none', 'no')}_")
+
+
+@pytest.mark.parametrize("text", ["50 mm", "ƒ/1.4", "カメラ"])
+def test_texts_of_a_png_hold_any_letter(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "map.png"
+    write_png16(path, np.zeros((4, 4, 3), np.uint16), texts={"lensModel": text})
+    with Image.open(path) as picture:
+        picture.load()
+        assert picture.text["lensModel"] == text  # type: ignore[attr-defined]

@@ -63,6 +63,19 @@ def test_a_disk_that_fills_leaves_what_was_recorded_whole(
     assert "exists already" in capsys.readouterr().err
 
 
+def test_a_writer_that_fails_in_any_way_ends_the_recording_and_nobody_waits_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = Recording(folder=tmp_path / "rec", most_bytes=64, waits=True)
+    (tmp_path / "rec" / "frames").mkdir(parents=True)
+    monkeypatch.setattr(recording, "write_codes", lambda *_: 1 // 0)
+    frame = LiveFrame(index=0, coded=Coded(codes=np.zeros((8, 8), np.uint8)), came_s=0.0)
+    record.take(frame)
+    record.write()
+    assert "Recording ended after 0 frames, which are whole: the next could not be written" in record.ended
+    record.take(frame)  # would wait for ever
+
+
 def test_a_disk_that_is_too_slow_ends_the_recording_without_a_hole(tmp_path: Path) -> None:
     record = Recording(folder=tmp_path / "rec", most_bytes=10 * 64)
     (tmp_path / "rec" / "frames").mkdir(parents=True)

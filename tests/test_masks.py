@@ -1,6 +1,7 @@
 """Where to solve, as a sequence of masks; and takes that show nothing, or less than the plan says."""
 
 import json
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -97,6 +98,21 @@ def test_a_mask_sequence_that_does_not_fit_is_refused_before_anything_is_solved(
         assert said in str(fault)
         assert "\n" not in str(fault)
         assert not (tmp_path / "out").exists()
+
+
+def test_two_masks_of_one_number_are_refused(tmp_path: Path) -> None:
+    folder = masks(tmp_path / "a", [1, 2])
+    shutil.copyfile(folder / "mask.0001.png", folder / "mask.1.png")
+    with pytest.raises(ps.PsvideoError, match=r"mask.0001.png and mask.1.png have one number. Expected one mask"):
+        open_masks(folder / "mask.####.png", width_px=SIZE, height_px=SIZE)
+
+
+def test_a_mask_s_width_and_height_are_held_each_by_itself(tmp_path: Path) -> None:
+    mask = masks(tmp_path / "a", [1]) / "mask.0001.png"
+    rows, cols = ps.read_mask(mask).shape
+    assert ps.read_mask(mask, width_px=cols).shape == ps.read_mask(mask, height_px=rows).shape == (rows, cols)
+    with pytest.raises(ps.PsvideoError, match=f"is {cols} x {rows} pixels, and the frames are {cols + 1} x {rows}"):
+        ps.read_mask(mask, width_px=cols + 1)
 
 
 def test_a_mask_sequence_is_known_by_all_its_pictures(tmp_path: Path) -> None:

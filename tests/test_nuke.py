@@ -1,5 +1,6 @@
 """The Nuke script of a delivery, parsed as Nuke reads scripts and evaluated node by node against n . l of the files."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,6 +64,28 @@ def test_the_script_gives_the_light_of_the_shoots_own_lamps(
     assert expected.max() > 0.1
     assert np.abs(shown[..., :3] - expected).max() < 1e-5
     assert np.array_equal(shown[..., 3:], valid)
+
+
+def test_a_clip_whose_name_holds_the_first_number_keeps_it(delivered: Callable[..., Path], tmp_path: Path) -> None:
+    clip = tmp_path / "shot.1001.v2"
+    shutil.copytree(delivered.folder / "clip", clip)  # type: ignore[attr-defined]
+    words = [
+        "normals",
+        clip,
+        "--rig",
+        clip / "rig.toml",
+        "-o",
+        tmp_path / "out",
+        "--for",
+        "nuke",
+        "--no-multipart",
+        "-q",
+    ]
+    assert main([*map(str, words), "--frames", "0-9"]) == 0
+    reads = [node for node in read_script(tmp_path / "out" / "shot.1001.v2.nk") if node.kind == "Read"]
+    assert reads
+    for node in reads:
+        assert node.knobs["file"].endswith(f'/{node.name}/shot.1001.v2_{node.name}.%04d.exr"')
 
 
 def test_every_read_stands_on_the_files_that_are_there(delivered: Callable[..., Path]) -> None:

@@ -5,12 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import av
 import numpy as np
 import OpenEXR
 import pytest
 from picture_file import read_picture
 
 from psvideo.cli.app import main
+from psvideo.clip.decode.decoders import decode
+from psvideo.clip.folder import KINDS
 from psvideo.errors import UsageError
 from psvideo.page import show_of
 from psvideo.page.picture import Look
@@ -51,6 +54,31 @@ def test_results_stand_beside_the_clip_they_were_made_from(shoot: Path) -> None:
     assert groups == {"Results", "Clip", "Plates by the rows' weights", "Plates by Algorithm 1"}
     assert show.sequences[0].id == "normals"
     assert show.sequence("frames") is not None
+
+
+def test_results_stand_beside_the_movie_they_were_made_from(shoot: Path, tmp_path: Path) -> None:
+    shutil.copyfile(shoot / "clip" / "plan.toml", tmp_path / "plan.toml")
+    with av.open(str(tmp_path / "take.mkv"), "w") as container:
+        stream = container.add_stream("ffv1", rate=100, options={"threads": "1"})
+        stream.width, stream.height, stream.pix_fmt = 160, 120, "gbrp16le"
+        for file in sorted((shoot / "clip" / "frames").iterdir()):
+            codes = np.asarray(decode(KINDS[file.suffix], file).codes)
+            colour = np.ascontiguousarray(np.broadcast_to(codes.reshape(120, 160, -1), (120, 160, 3)))
+            shown = av.VideoFrame.from_ndarray(colour, format="rgb48le")
+            container.mux(stream.encode(shown.reformat(format="gbrp16le")))
+        container.mux(stream.encode(None))
+    rig = str(shoot / "clip" / "rig.toml")
+    assert main(["normals", str(tmp_path / "take.mkv"), "--rig", rig, "-o", str(tmp_path / "out"), "-q"]) == 0
+    show, beside = show_of(tmp_path / "out"), show_of(shoot / "out")
+    assert "Frames are those of take.mkv." in show.notes
+    for name in ("frames", "normals"):
+        sequence = beside.sequence(name)
+        assert sequence is not None
+        number = sequence.numbers[1]
+        shown_at = show.sequence(name)
+        assert shown_at is not None
+        there = picture(show, name, shown_at.numbers[1])
+        assert np.abs(there - picture(beside, name, number)).max() <= 2
 
 
 @pytest.mark.parametrize("of", ["out", "clip"])

@@ -166,3 +166,20 @@ def test_measured_lights_of_other_programs_survive_a_round_trip(name: str, share
         write_rig(tmp_path / kind, rig)
         for found, measured in zip(read_rig(tmp_path / kind).lights, rig.lights, strict=True):
             assert found.direction == pytest.approx(measured.direction, abs=1e-15)
+
+
+def test_what_coloured_lights_lose_in_a_list_is_said(tmp_path: Path) -> None:
+    red = Light(name="red", direction=(0.0, 0.0, 1.0), colour=(1.0, 0.1, 0.0), error_deg=0.3)
+    for name in ("a.lp", "light_directions.txt"):
+        lost = " ".join(write_rig(tmp_path / name, Rig(lights=(red,), surface_colour=(1.0, 1.0, 1.0))))
+        for word in ("no colours of lights", "no errors of directions", "no colour of the surface"):
+            assert word in lost
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0, 5.0), (0.0, 0.0, float("nan")), (0.0, 0.0, float("inf")), (0.0, 0.0, 0.0)])
+def test_a_direction_is_a_unit_vector_of_finite_numbers(at: Vector) -> None:
+    with pytest.raises(UsageError, match="`direction`"):
+        Light(name="key", direction=at)
+    with pytest.raises(UsageError, match="`axis`"):
+        Light(name="key", position_m=(0.0, 0.0, 1.0), axis=at)
+    assert Light(name="key", direction=(0.0, 0.6, 0.8005)).direction == (0.0, 0.6, 0.8005)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -12,7 +13,7 @@ import OpenEXR
 import pytest
 import tifffile
 from numpy.typing import NDArray
-from PIL import Image, ImageCms
+from PIL import ExifTags, Image, ImageCms
 from PIL.PngImagePlugin import PngInfo
 
 import psvideo as ps
@@ -22,6 +23,7 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError
 from psvideo.inspect.describe import describe
+from psvideo.model.turn import EXIF
 from psvideo.synth.camera.dpx_writer import dpx_bytes
 
 SIZE, RADIUS = 64, 27
@@ -643,3 +645,14 @@ def test_a_sphere_that_the_picture_cuts_off_is_refused(tmp_path: Path) -> None:
     assert "ball" in str(fault.value)
     assert "\n" not in str(fault.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_profile_that_is_damaged_takes_neither_orientation_nor_exposure_with_it(tmp_path: Path) -> None:
+    tag = b"para\0\0\0\0" + struct.pack(">HH3i", 1, 0, 65536, 0, 65536)  # a = 0: divided by
+    profile = bytes(128) + struct.pack(">I4sII", 1, b"rTRC", 144, len(tag)) + tag
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.ExposureTime] = 0.5
+    Image.new("RGB", (8, 6)).save(tmp_path / "a.jpg", exif=exif, icc_profile=profile)
+    said = stated_by(tmp_path / "a.jpg")
+    assert (said.turn, said.exposure, said.longer_px, said.transfer) == (EXIF[6], 0.5, 8, None)

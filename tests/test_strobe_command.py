@@ -14,7 +14,7 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.runs.strobe.run import run as play
 from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
 from psvideo.strobe.runlog import as_played, format_log, plan_sha256, read_log
-from psvideo.strobe.seizures import flash_rates, seizure_warning
+from psvideo.strobe.seizures import Rate, flash_rates, seizure_warning
 
 RIGS = Path(__file__).resolve().parents[1] / "lights" / "rigs"
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
@@ -187,6 +187,12 @@ def test_a_flash_rate_that_is_dangerous_is_named_light_by_light(make_plan: Calla
     assert "light key, light left, light right at 36.5 Hz" in warning
     assert "all flashes together at 109.4 Hz" in warning
     assert seizure_warning(make_plan(lights=("key",), dark=False)) is None
+
+
+@pytest.mark.parametrize(("hz", "dangerous"), [(2.9, False), (3.0, True), (68.0, True), (70.0, True), (70.1, False)])
+def test_rates_from_3_to_70_a_second_are_dangerous(hz: float, dangerous: bool) -> None:
+    """IEEE 1789-2015."""
+    assert Rate(what="a light", hz=hz).is_dangerous == dangerous
 
 
 def test_a_synced_plan_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -81,9 +81,19 @@ def test_jobs_give_their_results_in_order_and_their_errors() -> None:
         write(lambda: print(1 // 0))
 
 
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="only Linux binds a process to cores")
+def test_a_process_that_is_bound_to_one_core_computes_with_one_thread() -> None:
+    """Farms bind jobs: more threads than cores would take turns."""
+    code = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+    code += "from psvideo.compute.threads import thread_count\nprint(thread_count())"
+    bare = {name: value for name, value in os.environ.items() if name != THREADS}
+    said = subprocess.run([sys.executable, "-c", code], env=bare, capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "1"
+
+
 def test_the_number_of_threads_is_set_in_one_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(THREADS, raising=False)
-    assert thread_count() == (os.cpu_count() or 1)
+    assert thread_count() >= 1
     monkeypatch.setenv(THREADS, "3")
     assert thread_count() == 3
     for wrong in ("0", "-1", "two", "1.5", "²"):

@@ -77,7 +77,9 @@ class RowsInFile:
         return np.empty((rows, *self.shape[1:]), self.kind)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        """Read the whole picture."""
+        """Read the whole picture. Raises ValueError where none may be copied: it lies in a file."""
+        if copy is False:
+            raise ValueError("A picture that stays in its file cannot be had without a copy.")
         return np.asarray(self[:], dtype)
 
     def view(self, kind: type[np.generic]) -> "RowsInFile":

@@ -132,7 +132,7 @@ class Kept:
         try:
             with self._lock:
                 self._file.seek(place.offset)
-                read = self._file.readinto(codes.data.cast("B"))
+                read = _filled(self._file, codes.data.cast("B"))
         except OSError as fault:
             raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
         if read != codes.nbytes:
@@ -140,14 +140,24 @@ class Kept:
         return CodedPicture(header=place.header, codes=codes)
 
 
+def _filled(file: FileIO, room: memoryview) -> int:
+    """Read until there is no more room, or no more to read; return how many bytes. One reading gives 2 GiB at most."""
+    done = 0
+    while done < len(room) and (more := file.readinto(room[done:])):
+        done += more
+    return done
+
+
 class _Shown:
     """The file as those see it who read rows of its pictures; open until the last of them is gone."""
 
     def __init__(self, file: FileIO) -> None:
+        self._opened = -1  # while nothing is open
         self._opened = os.dup(file.fileno())
 
     def __del__(self) -> None:
-        os.close(self._opened)
+        if self._opened >= 0:
+            os.close(self._opened)
 
     def opened(self) -> int:
         """Return the file, which is open, and nobody else's."""

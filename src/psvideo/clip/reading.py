@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from fileseq.exceptions import ParseException
+from fileseq.exceptions import MaxSizeException, ParseException
 from fileseq.frameset import FrameSet
 from numpy.typing import NDArray
 
@@ -73,6 +73,8 @@ def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
     present = tuple(numbers)
     try:
         wanted = set(FrameSet(text if text.strip() else "none"))
+    except MaxSizeException:
+        raise UsageError(f"`frames` {text}: names more frames than any clip has; {_span(present)}.") from None
     except (ParseException, ValueError):
         raise UsageError(f"`frames` {text}: is not a frame range. Write for example 1-100 or 1-100x2.") from None
     chosen = tuple(number for number in present if number in wanted)

@@ -8,7 +8,7 @@ import contextlib
 import io
 import struct
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,25 +50,27 @@ class Stated:
 
 
 def stated_by(path: Path) -> Stated:
-    """Return what a file says of itself; nothing where it is of a kind that says nothing, or cannot be read."""
+    """Return what a file says of itself; nothing where it is of a kind that says nothing, or cannot be read. What one
+    part of it says does not hang on another that is damaged."""
+    found = Stated()
     with contextlib.suppress(Exception), warnings.catch_warnings():  # Pillow may raise anything over damaged tags
         warnings.simplefilter("ignore")  # of tags that are damaged: what they say is left out
         check_file(path)
         with Image.open(path) as picture:
+            found = replace(found, longer_px=max(picture.size))
+            with contextlib.suppress(Exception):
+                transfer, by = _coded_curve(path) or _curve(picture.info)
+                found = replace(found, transfer=transfer, by=by)
             exif = picture.getexif()
+            found = replace(found, turn=EXIF.get(int(_above_0(exif.get(ExifTags.Base.Orientation)) or 1), UPRIGHT))
             taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
-            transfer, by = _coded_curve(path) or _curve(picture.info)
-            longer_px = max(picture.size)
-        return Stated(
-            transfer=transfer,
-            by=by,
+        found = replace(
+            found,
             exposure=_exposure(taken),
             focal_widths=_above_0(taken.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
-            longer_px=longer_px,
             camera=_camera(taken),
-            turn=EXIF.get(int(_above_0(taken.get(ExifTags.Base.Orientation)) or 1), UPRIGHT),
         )
-    return Stated()
+    return found
 
 
 def _above_0(value: Any, factor: float = 1.0) -> float | None:

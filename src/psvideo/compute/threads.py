@@ -7,6 +7,7 @@ is cut by the size of the work, never by the number of threads: sums of floating
 import contextlib
 import functools
 import os
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
@@ -25,14 +26,19 @@ Item = TypeVar("Item")
 Submit = Callable[[Callable[[], None]], None]
 
 THREADS = "PSVIDEO_THREADS"
-"""The environment variable that sets how many threads compute; without it, as many as the machine has cores."""
+"""The environment variable that sets how many threads compute; without it, as many as cores may be used."""
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use: a farm may bind it to some of the machine's."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def thread_count() -> int:
     """Return how many threads compute at a time. Raises UsageError where PSVIDEO_THREADS is no whole number above 0."""
     text = os.environ.get(THREADS, "")
     if not text:
-        return os.cpu_count() or 1
+        return usable_cores()
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
         raise UsageError(
             f"{THREADS}={text}: expected a whole number of threads, 1 or more. Correct the environment variable, or "

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, parse_record, read_json
 from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 
@@ -35,6 +36,11 @@ def read_clocks(path: Path) -> CameraClocks:
     """Read clocks.json. Raises PsvideoError that names the file, the key and what was expected."""
     data = read_json(path, advice="Make it again: psvideo sync of all cameras' clips.")
     file = parse_record(data, _ClocksFile, SCHEMA, source=str(path))
+    if file.reference != file.cameras[0].clip:
+        raise PsvideoError(
+            f"{path}: the reference is {file.reference!r}, and the first camera {file.cameras[0].clip!r}. Expected the "
+            "reference first, whose clock is that of all: make the file again with psvideo sync."
+        )
     return CameraClocks(
         cameras=tuple(CameraClock(**camera.model_dump()) for camera in file.cameras),
         numbering=file.numbering,

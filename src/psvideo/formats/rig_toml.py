@@ -12,12 +12,10 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
 from psvideo.formats.light_lists.light_list_reader import read_light_list
 from psvideo.formats.paths import path_of
-from psvideo.model.rig import Light, Rig, Vector, vector
+from psvideo.model.irradiance.ground import FARTHEST_M
+from psvideo.model.rig import UNIT_TOLERANCE, Light, Rig, Vector, vector
 
 SCHEMA = "psvideo-rig/1"
-UNIT_LENGTH_TOLERANCE = 0.01
-FARTHEST_LIGHT_M = 50.0
-"""No near light is further from the camera; positions in millimetres are, from 5 cm on."""
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -50,7 +48,7 @@ class _RigLight(Contract):
             )
         for key in ("direction", "axis"):
             vector = getattr(self, key)
-            if vector is not None and abs(np.linalg.norm(vector) - 1.0) > UNIT_LENGTH_TOLERANCE:
+            if vector is not None and abs(np.linalg.norm(vector) - 1.0) > UNIT_TOLERANCE:
                 length = np.linalg.norm(vector)
                 raise ValueError(
                     f"light {self.name!r}: {key} has length {length:.4g}, expected a unit vector (length 1)"
@@ -58,10 +56,10 @@ class _RigLight(Contract):
         if self.colour is not None and not any(self.colour):
             raise ValueError(f"light {self.name!r}: colour is black; expected what the camera's channels see of it")
         away_m = 0.0 if self.position_m is None else float(np.linalg.norm(self.position_m))
-        if away_m > FARTHEST_LIGHT_M:
+        if away_m > FARTHEST_M:
             raise ValueError(
                 f"light {self.name!r}: position_m is {away_m:.4g} metres from the camera, and a near light is at most "
-                f"{FARTHEST_LIGHT_M:.0f}; if these are millimetres, divide them by 1000"
+                f"{FARTHEST_M:.0f}; if these are millimetres, divide them by 1000"
             )
         return self
 

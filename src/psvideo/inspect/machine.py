@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from psvideo.compute.threads import usable_cores
 from psvideo.inspect.findings import Finding
 from psvideo.model.units import counted
 from psvideo.strobe.link.controller import serial_ports
@@ -24,7 +25,7 @@ def machine() -> Iterator[Finding]:
 
 def _cores() -> Finding:
     there = os.cpu_count() or 1
-    ours = len(os.sched_getaffinity(0)) if sys.platform == "linux" else there
+    ours = usable_cores()
     text = f"{ours} of {there} cores may be used" if ours < there else f"{there} cores"
     return Finding(name="processor", level="ok", text=f"{text}; solving uses them all", value=ours, unit="cores")
 

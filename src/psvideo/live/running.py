@@ -139,7 +139,8 @@ class Running:
         for thread in threads:
             thread.join(LEAVES_S)
         self.chain.wait(SEARCH_S)  # a short clip may end before the strobe is found in it
-        self._solve()
+        if not threads[-1].is_alive():  # else it is solving, and two would use one memory
+            self._solve()
 
     def _guarded(self, run: Callable[[], None]) -> None:
         try:

@@ -21,13 +21,17 @@ def vector(values: Sequence[float] | FloatArray) -> Vector:
     return float(values[0]), float(values[1]), float(values[2])
 
 
+UNIT_TOLERANCE = 0.01
+"""A unit vector's length may be off by this much: two digits a number, as people write them."""
+
+
 def three_numbers(name: str, given: object, expected: str) -> FloatArray:
-    """Return a parameter as three numbers, shape (3,); raises UsageError where it is anything else."""
+    """Return a parameter as three finite numbers, shape (3,); raises UsageError where it is anything else."""
     try:
         numbers = np.asarray(given, np.float64)
     except (TypeError, ValueError):
         numbers = np.empty(0)
-    if numbers.shape != (3,):
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise UsageError(f"`{name}` is {given!r:.60}; expected {expected}.")
     return numbers
 
@@ -74,8 +78,15 @@ class Light:
             )
         for name in ("direction", "position_m", "axis"):
             given = getattr(self, name)
-            if given is not None:
-                three_numbers(name, given, "three numbers (x, y, z): x right, y up, z towards the camera")
+            if given is None:
+                continue
+            vector = three_numbers(name, given, "three numbers (x, y, z): x right, y up, z towards the camera")
+            length = float(np.linalg.norm(vector))
+            if name != "position_m" and abs(length - 1) > UNIT_TOLERANCE:
+                raise UsageError(
+                    f"`{name}` of light {self.name!r} has length {length:.4g}; expected a unit vector. Divide it by "
+                    "its length; how strong a light is belongs into `intensity`."
+                )
         if self.colour is not None:
             three_numbers("colour", self.colour, "what red, green and blue see of the light: three numbers from 0 on")
         if (self.direction is None) == (self.position_m is None):

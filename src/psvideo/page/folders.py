@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from psvideo.clip.decode.exr import contents, read_halves
-from psvideo.clip.folder import number_of
+from psvideo.clip.folder import MOVIES, number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import read_json
 from psvideo.formats.timing_json import read_timing, timing_record
@@ -56,8 +56,10 @@ def _with_clip_beside(show: Show, path: Path) -> Show:
     timing = path / "timing.json"
     if not timing.is_file():
         return show
-    clip = path.resolve().parent / read_timing(timing).clip
-    if not clip.is_dir() or clip == path.resolve():
+    folder = path.resolve().parent / read_timing(timing).clip
+    movies = [movie for ending in MOVIES if (movie := folder.with_name(folder.name + ending)).is_file()]
+    clip = folder if folder.is_dir() and folder != path.resolve() else next(iter(movies), None)
+    if clip is None:
         return show
     try:
         return with_clip(show, clip, timing=timing)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.clip import Clip, demosaic, open_clip, read_frames
-from psvideo.model.camera import Camera
 from psvideo.model.choices import SplitMethod
 from psvideo.page.compared import ComparedPlates
 from psvideo.page.picture import Look, PagePicture, shown
@@ -45,7 +44,7 @@ def with_clip(show: Show, path: Path, *, timing: Path, plan: Path | None = None)
     clip = open_clip(path, plan=plan)
     plates = ComparedPlates(path, plan=plan, timing=timing if timing.is_file() else None)
     beside = (_frames(clip), *_compared(clip, plates, show.sequences[0]))
-    notes = (*show.notes, f"Frames are those of {path.name}/.")
+    notes = (*show.notes, f"Frames are those of {path.name}{'/' if path.is_dir() else ''}.")
     return replace(show, sequences=(*show.sequences, *beside), notes=notes, timing=plates.record)
 
 
@@ -59,14 +58,10 @@ def _frames(clip: Clip) -> ShownSequence:
         group="Clip",
         timeline="frames",
         numbers=clip.numbers,
-        times_s=tuple(clip.index_of(number) * camera.frame_period_s + _middle_s(camera) for number in clip.numbers),
+        times_s=tuple(clip.index_of(number) * camera.frame_period_s + camera.middle_s for number in clip.numbers),
         read=partial(_frame, clip),
         family=FAMILY,
     )
-
-
-def _middle_s(camera: Camera) -> float:
-    return (camera.exposure_s + abs(camera.readout_s or 0.0)) / 2
 
 
 def _frame(clip: Clip, number: int, look: Look) -> PagePicture:

@@ -146,7 +146,7 @@ def _row_at(timing: Timing, since_s: float, height: int) -> float | None:
     row = since_s / abs(timing.row_time_s)
     if not 0 <= row < height:
         return None
-    return row if timing.row_time_s > 0 else height - row
+    return row if timing.row_time_s > 0 else height - 1 - row
 
 
 def _drift_title(timing: Timing) -> str:

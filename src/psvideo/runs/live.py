@@ -8,7 +8,9 @@ from pathlib import Path
 
 from psvideo.errors import NoStrobeError
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_toml import SCHEMA as RIG
 from psvideo.formats.rig_toml import format_rig, read_rig
+from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
@@ -103,7 +105,7 @@ def live(
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=played.plan.lights)
     timing_path = path_if_given("timing_out", timing_out)
     if timing_path is not None:
-        refuse_existing(timing_path, force=force)
+        refuse_existing(timing_path, force=force, mark=TIMING)
     if known is not None:
         _check_rig(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
@@ -150,7 +152,7 @@ def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:
     if path is None:
         return lambda rig: "Lights found, and used from now on. With `rig_out` they are written, too."
     check_ending(path, ".toml", name="rig_out")
-    refuse_existing(path, force=force)
+    refuse_existing(path, force=force, mark=RIG)
 
     def write(rig: Rig) -> str:
         write_text(path, format_rig(rig))

@@ -8,12 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from psvideo.errors import PsvideoError, UsageError, check_kind
 from psvideo.model.camera import FloatArray
-from psvideo.model.rig import Light
+from psvideo.model.rig import UNIT_TOLERANCE, Light
 
 Images = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-UNIT_TOLERANCE = 0.01
-"""Directions may be this much longer or shorter than 1: files round them."""
 LEAST_LIGHTS = 3
 MOST_CLIPPED = 0.5
 """Where half of the pixels are clipped under every light, the scale is wrong rather than the exposure."""

@@ -15,13 +15,14 @@ from psvideo.clip.decode.decoders import decode, guarded
 from psvideo.clip.decode.exr import decode_channels
 from psvideo.clip.folder import KINDS, find_sequence
 from psvideo.errors import PsvideoError
+from psvideo.model.irradiance.ground import FARTHEST_M
 
 DEPTH_NAMES = ("Z", "depth", "distance", "Y", "V", "L", "R")
 """Channels of an EXR that may hold depth, the likeliest first; R only where the picture is grey."""
 BACKGROUND = 1e6
 """Renderers write a number beyond this where they saw nothing."""
-FARTHEST_M, NEAREST_M = 50.0, 0.01
-"""Between these lies the middle of any scene that near lights can light."""
+NEAREST_M = 0.01
+"""Between this and FARTHEST_M lies the middle of any scene that near lights can light."""
 MILLIMETRE_M = 1e-3
 
 Floats = NDArray[np.float32]

@@ -61,9 +61,9 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     codes = _codes(kind, path)
     brightest = stated_by(path).turn.upright(codes if codes.ndim == 2 else codes.max(axis=2))
     rows, cols = brightest.shape
-    if (height_px, width_px) not in ((rows, cols), (None, None)):
+    if height_px not in (rows, None) or width_px not in (cols, None):
         raise PsvideoError(
-            f"{path}: the mask is {cols} x {rows} pixels, and the frames are {width_px} x {height_px}. "
+            f"{path}: the mask is {cols} x {rows} pixels, and the frames are {width_px or cols} x {height_px or rows}. "
             "Paint it over a frame or a plate of this clip."
         )
     white = np.iinfo(codes.dtype).max if np.issubdtype(codes.dtype, np.integer) else 1.0

@@ -83,7 +83,14 @@ def _files(path: Path) -> dict[int, Path] | None:
         return None
     before, after = (re.escape(part) for part in (path.name[: placeholder.start()], path.name[placeholder.end() :]))
     pattern = re.compile(f"{before}([0-9]+){after}")
-    found = {int(match[1]): file for file in _pictures(path.parent) if (match := pattern.fullmatch(file.name))}
+    found: dict[int, Path] = {}
+    for file in _pictures(path.parent):
+        if match := pattern.fullmatch(file.name):
+            other = found.setdefault(int(match[1]), file)
+            if other != file:
+                raise PsvideoError(
+                    f"{path}: {other.name} and {file.name} have one number. Expected one mask per result: remove one."
+                )
     if not found:
         raise PsvideoError(
             f"{path}: no file is named like this. Expected numbered masks, such as mask.####.png for mask.1001.png and "

@@ -97,7 +97,7 @@ def _root(made: Delivered, size: str) -> str:
 
 
 def _read(made: Delivered, quantity: str, size: str) -> str:
-    file = result_name(made.clip, quantity, made.first).replace(f".{made.first:04d}.", ".%04d.")
+    file = result_name(made.clip, quantity, made.first).removesuffix(f".{made.first:04d}.exr") + ".%04d.exr"
     return (
         f'Read {{\n inputs 0\n file_type exr\n file "{FOLDER}/{file}"\n format "{size}"\n first {made.first}\n '
         f"last {made.last}\n origfirst {made.first}\n origlast {made.last}\n origset true\n raw true\n "

@@ -20,6 +20,8 @@ from psvideo.formats.whole_files import whole_file
 PNG_MAX = 65535
 GAMMA_1 = struct.pack(">I", 100_000)  # in hundred-thousandths
 BT709, LINEAR, RGB_MATRIX, FULL_RANGE = 1, 8, 0, 1  # ITU-T H.273
+NOT_COMPRESSED_NO_LANGUAGE = bytes(5)
+"""What stands between keyword and text of an iTXt chunk: the keyword's end, flag, method, language, translation."""
 _HEADER_END = 33  # signature 8, IHDR 4 + 4 + 13 + 4
 
 
@@ -51,8 +53,16 @@ def write_png16(path: Path, codes: NDArray[np.uint16], *, texts: Mapping[str, st
 def _tagged(png: bytes, texts: Mapping[str, str]) -> bytes:
     """Return a PNG with its tags put in before the pixels, where they have to stand."""
     colour = _chunk(b"cICP", bytes([BT709, LINEAR, RGB_MATRIX, FULL_RANGE])) + _chunk(b"gAMA", GAMMA_1)
-    words = [_chunk(b"tEXt", key.encode("latin-1") + b"\0" + text.encode("latin-1")) for key, text in texts.items()]
+    words = [_text(key, text) for key, text in texts.items()]
     return png[:_HEADER_END] + colour + b"".join(words) + png[_HEADER_END:]
+
+
+def _text(key: str, text: str) -> bytes:
+    """Return a chunk that holds a text: in UTF-8 where Latin-1, which more programs read, does not hold it."""
+    try:
+        return _chunk(b"tEXt", key.encode("latin-1") + b"\0" + text.encode("latin-1"))
+    except UnicodeEncodeError:
+        return _chunk(b"iTXt", key.encode("latin-1") + NOT_COMPRESSED_NO_LANGUAGE + text.encode("utf-8"))
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

@@ -74,10 +74,16 @@ def _lost(rig: Rig, kind: ListKind) -> tuple[str, ...]:
         lost.append("An .lp file holds no strengths, and these lights differ in theirs: they are lost.")
     if kind == "diligent":
         lost.append(f"The lists hold no names: lights are known by their order, {', '.join(rig.names)}.")
+    if any(light.colour is not None for light in rig.lights):
+        lost.append("The list holds no colours of lights: coloured lights that flash together cannot be told by it.")
+    if any(light.error_deg is not None for light in rig.lights):
+        lost.append("The list holds no errors of directions.")
     if any(light.reference_duration_s is not None for light in rig.lights):
         lost.append(
             "The list holds no reference durations: strengths are those of the flashes they were measured with."
         )
+    if rig.surface_colour is not None:
+        lost.append("The list holds no colour of the surface, by which coloured lights are told apart.")
     if rig.focal_px is not None or rig.plane is not None:
         lost.append("The list holds neither lens nor surface, which depth in metres needs.")
     return tuple(lost)

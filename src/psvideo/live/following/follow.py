@@ -161,7 +161,7 @@ class Follower:
         self._learn(rows)
 
     def _judge(self, rows: Profiles, rest: FloatArray) -> None:
-        """Return whether the latest frames show the strobe where the clock has it, and as well as those before did.
+        """Judge whether the latest frames show the strobe where the clock has it, and as well as those before did.
 
         Right after a change of light nobody knows: new brightnesses explain a few frames wherever flashes are.
         """

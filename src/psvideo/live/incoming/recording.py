@@ -75,7 +75,7 @@ class Recording:
                 index, codes = self._queue[0]
             try:
                 write_codes(self.folder / FRAMES / f"live.{index + 1:06d}.tif", codes)
-            except OSError as fault:
+            except Exception as fault:  # whatever it is, nobody may wait for this thread, nor take it for whole
                 self._give_up(index, fault)
                 return
             with self._changed:
@@ -90,12 +90,13 @@ class Recording:
             self._over = True
             self._changed.notify_all()
 
-    def _give_up(self, index: int, fault: OSError) -> None:
+    def _give_up(self, index: int, fault: Exception) -> None:
+        why = fault.strerror if isinstance(fault, OSError) else None
         (self.folder / FRAMES / f"live.{index + 1:06d}.tif").unlink(missing_ok=True)
         with self._changed:
             self.ended = (
                 f"Recording ended after {self.written} frames, which are whole: the next could not be written "
-                f"({fault.strerror or fault}). Make room on the disk, and record again."
+                f"({why or fault}). Make room on the disk, and record again."
             )
             self._queue.clear()
             self._changed.notify_all()

@@ -114,7 +114,8 @@ def slot_label(flash: PlannedFlash) -> str:
 
 def _slot_figures(plan: Plan, slot: int, speed_px_s: float | None) -> SlotFigures:
     flash = plan.flashes[slot]
-    share = max(flash.lights.values(), default=0.0) * flash.duration_s / plan.camera.exposure_s
+    shines_s = min(flash.duration_s, plan.camera.exposure_s)
+    share = max(flash.lights.values(), default=0.0) * shines_s / plan.camera.exposure_s
     partial, missing = row_shares(plan, flash.duration_s)
     frames = frames_per_flash(plan, flash.duration_s)
     return SlotFigures(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from psvideo.errors import UsageError
 from psvideo.formats.light_lists.light_list_writer import files_of, write_rig
-from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.rig_toml import SCHEMA, read_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.model.rig import Rig
 from psvideo.runs.steps.caller import PYTHON, Caller
@@ -39,7 +39,7 @@ def convert(
     path = Path(out)
     files = files_of(path)
     for file in files:
-        refuse_existing(file, force=force)
+        refuse_existing(file, force=force, mark=SCHEMA if file.suffix == ".toml" else None)
     if name and Path(rig).suffix == ".toml":
         raise UsageError(f"`name`: {rig} names its lights itself. Leave it out, or change the names in that file.")
     found = read_rig(Path(rig), plan_lights=tuple(name))

@@ -91,4 +91,5 @@ def _play(
             noted(outcome.message)
     except PsvideoError as fault:
         noted(str(fault))
-    holding.ended = True
+    finally:
+        holding.ended = True  # whatever ended it: nobody is there to be trimmed
