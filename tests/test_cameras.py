@@ -130,6 +130,22 @@ def test_whole_cycles_that_nothing_decides_are_listed_and_never_chosen(make_plan
         camera_clocks(takes, starts_s=[100.0, 100.0 + began_s + 0.45 * plan.cycle_s])
 
 
+@pytest.mark.parametrize("dark_code", [None, 7])
+def test_clips_that_are_said_not_to_have_run_at_the_same_time_share_nothing(
+    make_plan: PlanMaker, dark_code: int | None
+) -> None:
+    """Even where only one number would let them: a code that is unique says nothing of clips of different times."""
+    plan = make_plan() if dark_code is None else replace(make_plan(), dark_code=dark_code)
+    takes = [seen(plan, AT_FIRST, begin=0, count=60), seen(plan, TRUE, begin=17, count=60)]
+    began_s = takes[0].timing.flashes[17].start_s - takes[1].timing.flashes[0].start_s
+    for apart_s in (60.0, -60.0, began_s + 20.7 * plan.cycle_s):
+        with pytest.raises(UsageError, match=r"is said to begin .* s after A, and then they share no flashes"):
+            camera_clocks(takes, starts_s=[0.0, apart_s])
+    assert camera_clocks(takes, starts_s=[0.0, began_s + 0.2 * plan.cycle_s]).cameras[1].first_flash == 17
+    if dark_code is not None:  # one number alone needs no more than to be told from no overlap
+        assert camera_clocks(takes, starts_s=[0.0, began_s + 0.4 * plan.cycle_s]).cameras[1].first_flash == 17
+
+
 def test_exact_numbers_after_any_cut_of_two_seconds(make_plan: PlanMaker) -> None:
     plan = replace(make_plan(lights=("key", "left", "right", "top")), dark_code=7)
     count = round(2.0 * len(plan.cycle_slots) / plan.cycle_s)

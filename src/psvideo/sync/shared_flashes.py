@@ -24,8 +24,9 @@ CLEAR = 4.0
 """Standard errors by which a drift, or another strobe, must show."""
 LEAST_ERROR_S = 0.2e-6
 """No time is taken to be known better than so: shutters and LEDs are not."""
-NEAR = 0.25
-"""A start that is given decides between cycles where it is off by less than this share of one."""
+NEAR, HALF = 0.25, 0.5
+"""A start that is given decides between cycles where it is off by less than the first share of one. Off by more than
+the second it is nearer to another one, even where the clips share flashes in this one only."""
 
 SAME_S = 1e-9
 """Dark times that were computed may differ by so much and be the same."""
@@ -129,19 +130,12 @@ def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted
         more = ", ..." if len(possible) > 6 else ""
         raise PsvideoError(
             f"{names}: the strobe repeats itself every {first.plan.cycle_s:.4g} s, so which flashes they share is not "
-            f"certain: {take.timing.clip} may have begun {choices}{more} s after {first.timing.clip}. Say roughly when "
-            "each clip began, in seconds of any clock (`starts_s`), or plan with a longer code (`marker` coded)."
+            f"certain: if both ran at the same time, {take.timing.clip} may have begun {choices}{more} s after "
+            f"{first.timing.clip}; if not, they share none. Say roughly when each clip began, in seconds of any clock "
+            "(`starts_s`), or plan with a longer code (`marker` coded)."
         )
     if wanted_s is not None and possible:
-        number = min(possible, key=lambda one: abs(_began_s(first, take, one) - wanted_s))
-        off_s = abs(_began_s(first, take, number) - wanted_s)
-        if len(possible) > 1 and off_s > NEAR * first.plan.cycle_s:
-            raise UsageError(
-                f"`starts_s`: {names} are said to begin {wanted_s:.3f} s apart, and the nearest that the flashes allow "
-                f"is {_began_s(first, take, number):.3f} s; with a cycle of {first.plan.cycle_s:.4g} s that decides "
-                "nothing. Give starts that are right to a fifth of a cycle, or plan with a longer code."
-            )
-        possible = [number]
+        possible = [_nearest(first, take, possible, wanted_s)]
     shared = max(
         (_overlap(first, take, number)[1] - _overlap(first, take, number)[0] for number in possible), default=0
     )
@@ -151,6 +145,30 @@ def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted
             "recorded at the same time as the first one."
         )
     return possible[0]
+
+
+def _nearest(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted_s: float) -> int:
+    """Return which of the possible numbers goes with the start that is given.
+
+    Raises UsageError where none does: one that is nearer by a whole cycle is not among them, as the clips would share
+    nothing; or where the start lies between two.
+    """
+    cycle_s = first.plan.cycle_s
+    number = min(possible, key=lambda one: abs(_began_s(first, take, one) - wanted_s))
+    nearest_s = _began_s(first, take, number)
+    said = f"`starts_s`: {take.timing.clip} is said to begin {wanted_s:+.3f} s after {first.timing.clip}"
+    if abs(nearest_s - wanted_s) > HALF * cycle_s:
+        raise UsageError(
+            f"{said}, and then they share no flashes: only clips that ran at the same time do. By what the flashes "
+            f"show, with a cycle of {cycle_s:.4g} s, the nearest start at which they would is {nearest_s:+.3f} s. Name "
+            "clips that ran at the same time as the first one, or give other starts."
+        )
+    if len(possible) > 1 and abs(nearest_s - wanted_s) > NEAR * cycle_s:
+        raise UsageError(
+            f"{said}, and the nearest that the flashes allow is {nearest_s:+.3f} s; with a cycle of {cycle_s:.4g} s "
+            "that decides nothing. Give starts that are right to a fifth of a cycle, or plan with a longer code."
+        )
+    return number
 
 
 def _began_s(first: CameraTake, take: CameraTake, number: int) -> float:
