@@ -10,7 +10,7 @@ from docs.figures.staging import PICTURES, Pixels, exr, frames, psvideo, row
 import psvideo as ps
 from bench.colour import fan_scene, filmed, picture_of, scene_of, white_scene
 from psvideo.pictures.contact import sheet
-from psvideo.pictures.relighting import normal_colours, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
 
 WIDE_PX = 240
 SHEET_PX = 720

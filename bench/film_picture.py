@@ -10,7 +10,8 @@ import tomlkit
 from docs.figures.staging import PICTURES, Figure, Image, exr, figure, psvideo, row
 
 from psvideo.model.surface import Surface
-from psvideo.pictures.relighting import normal_colours, relight, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
+from psvideo.pictures.relighting import relight
 from psvideo.synth.scenes import builtin_scene
 
 TURN_DEG_PER_S = 40.0

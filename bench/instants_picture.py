@@ -10,7 +10,7 @@ from docs.figures.staging import PICTURES, Pixels, row
 import psvideo as ps
 from bench.instants import FPS, VIEWS, beauties, lit_at, small_scene
 from psvideo.pictures.contact import sheet
-from psvideo.pictures.relighting import srgb
+from psvideo.pictures.on_screen import srgb
 from psvideo.synth.scene import read_scene
 from psvideo.synth.scenes import builtin_scene
 from psvideo.synth.stage import set_stage

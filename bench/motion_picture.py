@@ -10,7 +10,7 @@ import numpy as np
 from bench.accuracy_measure import ROOT, angles_deg
 from bench.accuracy_motion import PITCH_S, Filmed, shoot
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.relighting import normal_colours, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import illumination

@@ -10,7 +10,7 @@ import numpy as np
 from bench.accuracy_measure import ROOT, SHARED_DATA, Case, angles_deg, diligent_ball, gloss, spread_subsets
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.relighting import normal_colours, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.robust import huber1981
 

@@ -11,7 +11,8 @@ from bench.accuracy_measure import ROOT, angles_deg
 from bench.accuracy_whole import bust
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.relighting import normal_colours, relight, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
+from psvideo.pictures.relighting import relight
 from psvideo.solve.normals.solving import Solving
 
 LIGHTS = (0, 1, 2)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from psvideo.clip import demosaic
-from psvideo.clip.decode.malvar2004 import PATTERNS
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import CFA_PATTERNS
 
 
 def mosaic_of(colour: NDArray[np.float32], cfa: str) -> NDArray[np.float32]:
@@ -44,7 +44,7 @@ def by_hand(image: NDArray[np.float32], cfa: str, row: int, col: int) -> list[fl
     return [found[name] for name in "RGB"]
 
 
-@pytest.mark.parametrize("cfa", PATTERNS)
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
 def test_every_pixel_agrees_with_the_papers_equations(cfa: str) -> None:
     image = np.random.default_rng(5).uniform(0, 1, (9, 10)).astype(np.float32)
     colour = demosaic(image, cfa)
@@ -53,18 +53,18 @@ def test_every_pixel_agrees_with_the_papers_equations(cfa: str) -> None:
             assert colour[row, col].tolist() == pytest.approx(by_hand(image, cfa, row, col), abs=1e-5)
 
 
-@given(seed=st.integers(0, 1000), cfa=st.sampled_from(PATTERNS), rows=st.integers(4, 13), cols=st.integers(4, 13))
+@given(seed=st.integers(0, 1000), cfa=st.sampled_from(CFA_PATTERNS), rows=st.integers(4, 13), cols=st.integers(4, 13))
 def test_measured_samples_are_kept_exactly(seed: int, cfa: str, rows: int, cols: int) -> None:
     image = np.random.default_rng(seed).uniform(-0.1, 2, (rows, cols)).astype(np.float32)
     assert np.array_equal(mosaic_of(demosaic(image, cfa), cfa), image)
 
 
-@pytest.mark.parametrize("cfa", PATTERNS)
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
 def test_even_grey_is_exact_to_the_border(cfa: str) -> None:
     assert np.abs(demosaic(np.full((8, 9), 0.4, np.float32), cfa) - 0.4).max() < 1e-6
 
 
-@pytest.mark.parametrize("cfa", PATTERNS)
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
 @pytest.mark.parametrize("shape", [(3, 3), (3, 9), (7, 4), (150, 5)])
 def test_the_border_is_as_if_the_picture_were_mirrored_about_its_outermost_pixels(
     cfa: str, shape: tuple[int, int]
@@ -81,7 +81,7 @@ def test_a_mosaic_of_one_pixel_or_row_is_no_fault() -> None:
         assert np.isfinite(colour).all()
 
 
-@given(seed=st.integers(0, 1000), cfa=st.sampled_from(PATTERNS))
+@given(seed=st.integers(0, 1000), cfa=st.sampled_from(CFA_PATTERNS))
 def test_sums_of_mosaics_demosaic_to_sums(seed: int, cfa: str) -> None:
     """This is why plates may be split in the mosaic."""
     first, second = np.random.default_rng(seed).uniform(0, 1, (2, 8, 8)).astype(np.float32)

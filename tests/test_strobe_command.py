@@ -78,7 +78,7 @@ def test_a_check_shows_ticks_wiring_and_what_to_beware_of(plan_file: Path, capsy
     said = capsys.readouterr()
     assert "flash 1: key at 1, 0.8 ms = 1600 ticks" in said.out
     assert "may be 5000 ppm off, and the dark time leaves a margin of 100 ppm" in said.err
-    assert "between 3 and 65 Hz" in said.err
+    assert "between 3 and 70 Hz" in said.err
     assert run("strobe", "check", plan_file, "--board", "rp2040") == 0
     assert "ppm off" not in capsys.readouterr().err
 

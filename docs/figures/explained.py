@@ -11,7 +11,8 @@ from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.timing_json import read_timing
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.surface import Surface
-from psvideo.pictures.relighting import normal_colours, relight, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
+from psvideo.pictures.relighting import relight
 
 FRAME = 5
 LAMPS = {

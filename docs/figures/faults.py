@@ -23,7 +23,8 @@ from docs.figures.staging import (
 )
 
 from psvideo.model.surface import Surface
-from psvideo.pictures.relighting import normal_colours, relight, srgb
+from psvideo.pictures.on_screen import normal_colours, srgb
+from psvideo.pictures.relighting import relight
 
 BRIGHT = 1.7
 """Exposure of all pictures of frames and plates."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from docs.figures.staging import Figure, figure, row
 
-from psvideo.pictures.relighting import srgb
+from psvideo.pictures.on_screen import srgb
 
 PAGE = Path(__file__).resolve().parents[1] / "python.md"
 RELIT = 3

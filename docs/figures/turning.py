@@ -8,7 +8,7 @@ import OpenEXR
 from bench.rolling import LIGHT, Picture, continuous, flashed, scene_at
 from docs.figures.staging import Figure, Pixels, figure, psvideo, row
 
-from psvideo.pictures.relighting import srgb
+from psvideo.pictures.on_screen import srgb
 from psvideo.synth.scene import read_scene
 from psvideo.synth.scenes import builtin_scene
 from psvideo.synth.stage import set_stage

@@ -9,7 +9,7 @@ from psvideo.calibrate.light_pictures import AMBIENT_NAMES, MASK_NAMES, ROOM_NAM
 from psvideo.clip.folder import KINDS, USUAL_KINDS, number_of, unread_in
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name
-from psvideo.formats.plan_toml import FRAMES
+from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
 from psvideo.formats.timing_json import read_timing
 
 TIMING = "timing.json"
@@ -87,7 +87,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
 
 def _instead(folder: Path) -> str:
     """Say what was expected of a folder without pictures, and what may have been meant."""
-    if (folder / FRAMES).is_dir() and (folder / "plan.toml").is_file():
+    if (folder / FRAMES).is_dir() and (folder / PLAN_FILE).is_file():
         return "It is a clip with its plan: psvideo normals takes it."
     kinds = ", ".join(USUAL_KINDS)
     expected = f"Expected still photographs, one per light ({kinds}), or a folder of plates per light."

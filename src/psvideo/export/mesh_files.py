@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.export.space import Space, placed, placed_points
 from psvideo.formats.whole_files import whole_file
+from psvideo.model.srgb import srgb_share
 from psvideo.solve.depth.mesh import Mesh
 
 KEPT = tuple(field.name for field in fields(Mesh))
@@ -64,10 +65,8 @@ def write_ply(path: Path, mesh: Mesh, space: Space) -> None:
 
 def srgb_codes(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return linear light as 8-bit sRGB codes with full opacity, (vertex, 4)."""
-    light = np.clip(linear, 0, 1)
-    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
     codes = np.full((len(linear), 4), 255, np.uint8)
-    codes[:, :3] = curve * 255 + 0.5
+    codes[:, :3] = srgb_share(linear) * 255 + 0.5
     return codes
 
 

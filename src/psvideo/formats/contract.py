@@ -98,13 +98,14 @@ def parse_toml(text: str, model: type[Model], schema: str, *, source: str) -> Mo
     return parse_record(data, model, schema, source=source)
 
 
-def parse_record(data: dict[str, Any], model: type[Model], schema: str, *, source: str) -> Model:
-    """Check what a TOML or JSON file holds against its model. ``source`` is the name that messages give it."""
+def parse_record(data: dict[str, Any], model: type[Model], schema: str, *, source: str, advice: str = "") -> Model:
+    """Check what a TOML or JSON file holds against its model. ``source`` is the name that messages give it; ``advice``:
+    a sentence on what to do, after them."""
     check_schema(data.get("schema"), schema, source=source)
     try:
         return model.model_validate(data)
     except ValidationError as fault:
-        raise PsvideoError(_sentence(source, model, fault)) from None
+        raise PsvideoError(f"{_sentence(source, model, fault)} {advice}".rstrip()) from None
 
 
 def check_schema(found: object, expected: str, *, source: str) -> None:

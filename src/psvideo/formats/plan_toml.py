@@ -11,12 +11,11 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
 from psvideo.formats.frame_rates import parse_fps
 from psvideo.formats.paths import path_of
-from psvideo.model.camera import Camera, Encoding, exposure_of
+from psvideo.model.camera import Camera, CfaPattern, Encoding, exposure_of
 from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import Mode, Plan, PlannedFlash, assemble_plan
 
 SCHEMA = "psvideo-plan/1"
-CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
 
 Power = Annotated[float, Field(ge=0, le=1)]
 
@@ -32,7 +31,7 @@ class _Camera(Contract):
     transfer: str = "linear"
     black_level: float | None = None
     white_level: float | None = None
-    cfa: Literal["RGGB", "BGGR", "GRBG", "GBRG"] | None = None
+    cfa: CfaPattern | None = None
 
     @field_validator("fps")
     @classmethod
@@ -233,8 +232,8 @@ def _camera_table(camera: Camera) -> tomlkit.items.Table:
     return table
 
 
-FRAMES = "frames"
-"""The folder in a clip's in which its frames may lie."""
+FRAMES, PLAN_FILE = "frames", "plan.toml"
+"""What may hold a clip's frames in its folder, and what its plan is called there."""
 
 
 def find_plan(path: Path, *, given: Path | None = None) -> Path:
@@ -242,8 +241,8 @@ def find_plan(path: Path, *, given: Path | None = None) -> Path:
     if given is not None:
         return given
     folder = path if path.is_dir() else path.parent
-    plan = folder / "plan.toml"
-    if not plan.is_file() and folder.name == FRAMES and (folder.parent / "plan.toml").is_file():
+    plan = folder / PLAN_FILE
+    if not plan.is_file() and folder.name == FRAMES and (folder.parent / PLAN_FILE).is_file():
         raise PsvideoError(f"{folder}: there is no plan.toml here, but one folder up. Name the clip: {folder.parent}")
     if not plan.is_file():
         raise PsvideoError(

@@ -3,15 +3,15 @@
 import json
 from pathlib import Path
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from psvideo.errors import PsvideoError
-from psvideo.formats.contract import Contract, check_schema, read_json
+from psvideo.formats.contract import Contract, parse_record, read_json
 from psvideo.formats.paths import path_of
 from psvideo.model.rows.ripple import Ripple
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 
 SCHEMA = "psvideo-timing/1"
+ADVICE = "Make it again with psvideo sync."
 
 
 class _FlashFile(Contract):
@@ -80,18 +80,12 @@ def read_timing(path: Path | str) -> Timing:
     True
     """
     path = path_of("path", path)
-    return parse_timing(read_json(path, advice="Make it again with psvideo sync."), source=str(path))
+    return parse_timing(read_json(path, advice=ADVICE), source=str(path))
 
 
 def parse_timing(data: dict[str, object], *, source: str) -> Timing:
     """Return the timing that a record as ``timing_record`` gives it holds; ``source`` names its file in errors."""
-    check_schema(data.get("schema"), SCHEMA, source=source)
-    try:
-        file = _TimingFile.model_validate(data)
-    except ValidationError as fault:
-        first = fault.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise PsvideoError(f"{source}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
+    file = parse_record(data, _TimingFile, SCHEMA, source=source, advice=ADVICE)
     flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
     dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
     scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames", "mains"})

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
+from psvideo.formats.plan_toml import PLAN_FILE
 from psvideo.formats.whole_files import refuse_existing, write_text
 
 if sys.platform != "win32":
@@ -158,7 +159,7 @@ def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, s
     if not path.exists():
         return
     empty = path.is_dir() and not any(path.iterdir())
-    footage = (path / "plan.toml").exists() and not mark.startswith("truth/")
+    footage = (path / PLAN_FILE).exists() and not mark.startswith("truth/")
     if not empty and (footage or not (path / mark).is_file()):
         found = "holds a plan.toml" if footage else f"holds no {mark}"
         raise UsageError(

@@ -12,7 +12,7 @@ from psvideo.clip.folder import KINDS
 from psvideo.clip.reading import looks
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import read_text
-from psvideo.formats.plan_toml import read_plan
+from psvideo.formats.plan_toml import PLAN_FILE, read_plan
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.about_output import describe_output, output_around
@@ -97,7 +97,7 @@ def _rig(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
         findings.append(ok(f"{len(near)} of them near, with positions; the others distant, with directions"))
     if len(rig.lights) < 3:
         findings.append(warn("normals need three lights or more"))
-    plan = path.with_name("plan.toml")
+    plan = path.with_name(PLAN_FILE)
     if plan.is_file():
         findings += rig_findings(path, read_plan(plan))
     return {"lights": list(rig.names), "near_lights": near}, findings
@@ -138,7 +138,7 @@ def _strobe_log(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
         findings.append(warn(f"the run broke off: {log.fault}"))
     if log.clock is not None:
         findings.append(ok(f"the board's clock: {log.clock.offset_ppm:+.0f} ± {log.clock.error_ppm:.0f} ppm"))
-    plan = path.with_name("plan.toml")
+    plan = path.with_name(PLAN_FILE)
     if plan.is_file():
         played = as_played(read_plan(plan), plan)
         findings.append(warn(played.warning) if played.warning else ok("it is the log of the plan.toml beside it"))

@@ -8,6 +8,7 @@ from pathlib import Path
 from psvideo.clip.decode import exr
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError
+from psvideo.formats.plan_toml import PLAN_FILE
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.quantities import ALWAYS, QUANTITIES
@@ -16,7 +17,7 @@ from psvideo.model.units import counted
 
 def is_plates(folder: Path) -> bool:
     """Return whether ``split`` wrote this folder: a timing beside one folder of plates per light, and no plan."""
-    if not (folder / "timing.json").is_file() or (folder / "plan.toml").is_file():
+    if not (folder / "timing.json").is_file() or (folder / PLAN_FILE).is_file():
         return False
     return bool(_sequences(folder)) and not is_results(folder)
 
@@ -26,10 +27,10 @@ def is_results(folder: Path) -> bool:
     return any((folder / "normals").glob("*.exr"))
 
 
-def takes_in(folder: Path) -> tuple[Path, ...]:
+def solved_takes_in(folder: Path) -> tuple[Path, ...]:
     """Return the folders of results or plates in a folder that is neither of them nor a clip: those of several takes.
     Empty where there are none."""
-    if (folder / "plan.toml").is_file() or is_results(folder) or is_plates(folder):
+    if (folder / PLAN_FILE).is_file() or is_results(folder) or is_plates(folder):
         return ()
     inside = sorted(entry for entry in folder.iterdir() if entry.is_dir() and not entry.name.startswith("."))
     return tuple(entry for entry in inside if is_results(entry) or is_plates(entry))
@@ -37,7 +38,7 @@ def takes_in(folder: Path) -> tuple[Path, ...]:
 
 def describe_takes(folder: Path) -> Description:
     """Describe a folder of results or plates of several takes: what each is, and what does not fit in any."""
-    found = [describe_output(take) for take in takes_in(folder)]
+    found = [describe_output(take) for take in solved_takes_in(folder)]
     findings = [finding for one in found for finding in _in_short(one)]
     facts: dict[str, Fact] = {"takes": [one.path.name for one in found]}
     return Description(path=folder, kind="results of several takes", facts=facts, findings=tuple(findings))
@@ -55,7 +56,7 @@ def _in_short(take: Description) -> Iterator[Finding]:
 
 def output_around(path: Path) -> Path | None:
     """Return the folder of results or plates that a path is a part of: a folder or file in it, or a movie for eyes."""
-    if (path / "plan.toml").is_file():
+    if (path / PLAN_FILE).is_file():
         return None
     around = (path.parent, path.parent.parent) if path.parent.name == "preview" else (path.parent,)
     return next((folder for folder in around if is_results(folder) or is_plates(folder)), None)

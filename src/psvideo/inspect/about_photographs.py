@@ -8,6 +8,7 @@ from psvideo.calibrate.light_files import find_stills
 from psvideo.clip.reading import looks
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError
+from psvideo.formats.plan_toml import PLAN_FILE
 from psvideo.inspect.findings import Finding, ok, warn
 from psvideo.model.units import counted
 
@@ -22,7 +23,7 @@ def photograph_findings(folder: Path) -> Iterator[Finding]:
     with contextlib.suppress(PsvideoError):
         found = find_stills(folder)
         files = [one[0] for one in found.by_light.values()]
-    if not FEWEST <= len(files) <= MOST or (folder.parent / "plan.toml").is_file():
+    if not FEWEST <= len(files) <= MOST or (folder.parent / PLAN_FILE).is_file():
         return
     pictures = look_at(files)
     span = f"{files[0].name} to {files[-1].name}"

@@ -13,7 +13,7 @@ from psvideo.inspect.about_output import (
     is_plates,
     is_results,
     output_around,
-    takes_in,
+    solved_takes_in,
 )
 from psvideo.inspect.findings import Description
 
@@ -38,6 +38,6 @@ def describe(path: Path, *, plan: Path | None = None) -> Description:
         return describe_file(path)
     if plan is None and (is_results(path) or is_plates(path)):
         return describe_output(path)
-    if plan is None and around is None and takes_in(path):
+    if plan is None and around is None and solved_takes_in(path):
         return describe_takes(path)
     return describe_clip(path, plan) if around is None else describe_output(around)

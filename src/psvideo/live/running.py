@@ -33,7 +33,7 @@ SEARCH_S = 60.0
 LEAVES_S = 5.0
 """Whoever reads a source that is silent hears only with its next frame that the run is over, and is waited for so long.
 """
-Shown = Callable[[NewestRound], None]
+Shows = Callable[[NewestRound], None]
 Meanwhile = Callable[[NewestRound, float], None]
 Said = Callable[[LiveStatus], None]
 
@@ -55,7 +55,7 @@ class Running:
     chain: Chain
     source: LiveSource
     quality: Quality
-    shown: Shown
+    shown: Shows
     said: Said
     meanwhile: Meanwhile = lambda newest, until_s: None
     prepare: Callable[[], None] = lambda: None

@@ -7,6 +7,7 @@ row, so that time zero is always the moment at which the first frame's first row
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,11 @@ from numpy.typing import NDArray
 from psvideo.errors import PsvideoError
 
 FloatArray = NDArray[np.float64]
+
+
+CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+"""The colour filters of the top left 2 x 2 pixels, row by row."""
+CFA_PATTERNS: tuple[CfaPattern, ...] = get_args(CfaPattern)
 
 
 @dataclass(frozen=True, kw_only=True)

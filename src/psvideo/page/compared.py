@@ -18,6 +18,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import timing_record
 from psvideo.model.choices import SplitMethod
 from psvideo.model.timing import Timing, places_in_time
+from psvideo.page.picture import HALF_MAX
 
 if TYPE_CHECKING:
     from psvideo.clip import Take
@@ -124,5 +125,5 @@ def _plates(take: "Take", timing: Timing, method: SplitMethod, number: int) -> M
 
 
 def _kept(plate: "LightPlate") -> ComparedPlate:
-    image = np.clip(plate.image, -65504, 65504).astype(np.float16)
+    image = np.clip(plate.image, -HALF_MAX, HALF_MAX).astype(np.float16)
     return ComparedPlate(image=image, time_s=plate.time_s, number=plate.number)

@@ -11,7 +11,7 @@ from psvideo.clip.folder import MOVIES, number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import read_json
 from psvideo.formats.timing_json import read_timing, timing_record
-from psvideo.inspect.about_output import is_plates, is_results, takes_in
+from psvideo.inspect.about_output import is_plates, is_results, solved_takes_in
 from psvideo.model.quantities import QUANTITIES, Quantity
 from psvideo.model.units import counted
 from psvideo.page.footage import show_of_clip, with_clip
@@ -30,7 +30,7 @@ def show_of(path: Path, *, clip: Path | None = None, plan: Path | None = None) -
     """
     if not path.exists():
         raise PsvideoError(f"{path}: there is no such file or folder. Name a folder of results or plates, or a clip.")
-    if path.is_dir() and (takes := takes_in(path)):
+    if path.is_dir() and (takes := solved_takes_in(path)):
         held = f"holds results of {counted(len(takes), 'take')}"
         raise UsageError(f"{path}: {held}. Name one, such as {takes[0]}; several are shown side by side.")
     if not path.is_dir() or not (is_results(path) or is_plates(path)):

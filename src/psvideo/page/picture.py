@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.halves import halves_of
-from psvideo.pictures.relighting import smaller
+from psvideo.pictures.on_screen import smaller
 
 MAGIC = b"PSVB"
 HALF_MAX = 65504.0

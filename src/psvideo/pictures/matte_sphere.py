@@ -9,7 +9,7 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.matte import MatteLight, sphere_normals
 from psvideo.calibrate.sphere.outline import Outline
 from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
-from psvideo.pictures.relighting import srgb
+from psvideo.pictures.on_screen import srgb
 
 TILE_PX = 150
 OUTLINE = (90, 230, 120)

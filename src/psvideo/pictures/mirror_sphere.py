@@ -10,7 +10,7 @@ from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting
 from psvideo.model.camera import FloatArray
 from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
-from psvideo.pictures.relighting import srgb
+from psvideo.pictures.on_screen import srgb
 
 WIDTH_PX = 1200
 TALLEST_PX = 1000

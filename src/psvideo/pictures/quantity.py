@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import UsageError, check_kind, nearest
 from psvideo.model.quantities import QUANTITIES, Quantity
-from psvideo.pictures.relighting import exposure_for, normal_colours, srgb, three_channels
+from psvideo.pictures.on_screen import exposure_for, normal_colours, srgb, three_channels
 
 Pixels = NDArray[np.uint8]
 RANGE_PERCENT = (2, 98)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.pictures.charts import stops_chart
-from psvideo.pictures.relighting import normal_colours
+from psvideo.pictures.on_screen import normal_colours
 from psvideo.report.judgement import Judgement, gravest_first, usable
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE

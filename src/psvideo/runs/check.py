@@ -131,7 +131,7 @@ def judged_take(
             notes: tuple[str, ...] = ()
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
-            timing = _with_later_holes(timing, clip, window)
+            timing = _with_later_holes(timing, clip)
             lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
             notes = timing.notes
     return Check(
@@ -208,7 +208,7 @@ def _unseen(reason: str) -> Judgement:
     return Judgement(subject="strobe", grade="bad", found=reason)
 
 
-def _with_later_holes(timing: Timing, clip: Clip, window: tuple[int, ...]) -> Timing:
+def _with_later_holes(timing: Timing, clip: Clip) -> Timing:
     """Add the holes that the numbering shows after the frames that were looked at."""
     known = {hole.after for hole in timing.dropped_frames}
     more = [DroppedFrames(after=after, count=count) for after, count in clip.dropped if after not in known]

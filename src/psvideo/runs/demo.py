@@ -15,8 +15,9 @@ from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.model.rig import Vector
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
+from psvideo.pictures.on_screen import exposure_for, srgb
 from psvideo.pictures.quantity import picture_of
-from psvideo.pictures.relighting import exposure_for, relight, srgb
+from psvideo.pictures.relighting import relight
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.runs.instants.job import Job
 from psvideo.runs.instants.results import normals_run

@@ -87,13 +87,13 @@ def cycle_ticks(steps: Sequence[Slot]) -> int:
 
 def share_ppm(steps: Sequence[Slot], line: int) -> int:
     """Return the share of a cycle that a line is on, rounded down."""
-    return sum(lit_ticks(slot, line) for slot in steps) * 1_000_000 // cycle_ticks(steps)
+    return sum(lit_ticks(slot, line) for slot in steps) * PPM // cycle_ticks(steps)
 
 
 def total_ppm(steps: Sequence[Slot]) -> int:
     """Return the shares of all lines, summed before they are rounded down."""
     lit = sum(lit_ticks(slot, lit.line) for slot in steps for lit in slot.lit)
-    return lit * 1_000_000 // cycle_ticks(steps)
+    return lit * PPM // cycle_ticks(steps)
 
 
 def cycle_refusal(steps: Sequence[Slot], caps: Capabilities, *, longer: int = 0) -> Refusal | None:

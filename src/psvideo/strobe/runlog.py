@@ -8,10 +8,9 @@ import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from psvideo.errors import PsvideoError
-from psvideo.formats.contract import Contract, check_schema, read_json
+from psvideo.formats.contract import Contract, parse_record, read_json
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
 from psvideo.strobe.clock import ClockFit
 from psvideo.strobe.limits import lit_ticks
@@ -20,6 +19,7 @@ from psvideo.strobe.program import PS_PER_S, Program
 from psvideo.strobe.session import Ended, Outcome, Ready
 
 SCHEMA = "psvideo-strobe/1"
+ADVICE = "Take it away, or write it again."
 LOG_NAME = "strobe.json"
 CAMERA_CLOCK_PPM = 100.0
 """How far a camera's clock, a crystal, may be off."""
@@ -126,14 +126,7 @@ def format_log(log: RunLog) -> str:
 
 def read_log(path: Path) -> RunLog:
     """Read strobe.json. Raises PsvideoError that names the file, the key and what was expected."""
-    data = read_json(path, advice="Take it away, or write it again.")
-    check_schema(data.get("schema"), SCHEMA, source=str(path))
-    try:
-        return RunLog.model_validate(data)
-    except ValidationError as fault:
-        first = fault.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Take it away, or write it again.") from None
+    return parse_record(read_json(path, advice=ADVICE), RunLog, SCHEMA, source=str(path), advice=ADVICE)
 
 
 @dataclass(frozen=True, kw_only=True)

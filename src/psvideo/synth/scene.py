@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 from psvideo.formats.contract import Contract, read_toml
 from psvideo.formats.frame_rates import parse_fps
 from psvideo.formats.plan_toml import RoundTable
+from psvideo.model.camera import CfaPattern
 
 SCHEMA = "psvideo-scene/1"
 
@@ -41,7 +42,7 @@ class CameraTable(Contract):
     principal_px: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     rays: int = Field(default=1, ge=1, le=8)
     colour: Literal["rgb", "grey"] = "rgb"
-    cfa: Literal["RGGB", "BGGR", "GRBG", "GBRG"] | None = None
+    cfa: CfaPattern | None = None
     transfer: Literal["linear", "srgb", "rec709", "slog3", "logc3"] = "linear"
     bits: int = Field(default=12, ge=8, le=16)
     black_level: float | None = Field(default=None, ge=0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.paths import path_of
-from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.plan_toml import PLAN_FILE, format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.formats.whole_folders import whole_folder
@@ -141,7 +141,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
         channels=scene.camera.channels,
     )
     clipped = [_record(stage, folder, n, image) for n, image in zip(kept, light, strict=True)]
-    (folder / "plan.toml").write_text(format_plan(claimed_plan(scene)), encoding="utf-8")
+    (folder / PLAN_FILE).write_text(format_plan(claimed_plan(scene)), encoding="utf-8")
     (folder / "rig.toml").write_text(format_rig(stage.rig), encoding="utf-8")
     write_timing(folder / "truth", plan, flashes, truth.plates)
     write_scene_truth(folder / "truth", scene, plan, clock, max(clipped), traced)

@@ -61,7 +61,7 @@ def timing_diagram(plan: Plan, *, phase_s: float | None = None, frames: int | No
         shapes += _frame_outline(line, frame)
     shapes += _axes(line)
     shapes += _legend(line)
-    shapes += _title(plan, line)
+    shapes += _title(plan)
     return Drawing(width=WIDTH, height=HEIGHT, shapes=tuple(shapes))
 
 
@@ -207,7 +207,7 @@ def _entry(
     yield Label(at=(x + 19, y), text=text, size=12, anchor="start")
 
 
-def _title(plan: Plan, line: Timeline) -> Iterator[Label]:
+def _title(plan: Plan) -> Iterator[Label]:
     camera = plan.camera
     readout = "global shutter" if camera.readout_s == 0 else f"readout {show_seconds(abs(camera.readout_s or 0.0))}"
     if camera.readout_s is None:

@@ -142,8 +142,10 @@ def _print_check(voice: Voice, check: "Check") -> None:
 
 
 def _print_fault(voice: Voice, path: Path, fault: str) -> None:
+    from psvideo.runs.steps.checked import SCHEMA
+
     if voice.json:
-        print_json(json_text.dumps({"schema": "psvideo-check/1", "path": str(path), "usable": False, "error": fault}))
+        print_json(json_text.dumps({"schema": SCHEMA, "path": str(path), "usable": False, "error": fault}))
     else:
         voice.say(f"{path}: cannot be checked yet.\n  {_word('bad')} footage   {fault}")
     sys.stdout.flush()

@@ -17,8 +17,7 @@ from psvideo.cli.options.typed import (
 )
 from psvideo.clip.transfer import check_transfer
 from psvideo.errors import UsageError
-from psvideo.formats.plan_toml import CFA_PATTERNS
-from psvideo.model.camera import Encoding
+from psvideo.model.camera import CFA_PATTERNS, Encoding
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Mode
 
 UNKNOWN = "unknown"

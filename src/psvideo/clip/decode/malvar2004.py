@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import CFA_PATTERNS
 
-PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
 EACH_ROWS = 64
 """Rows that a thread makes at a time."""
 
@@ -21,9 +21,9 @@ def demosaic(image: NDArray[np.float32], cfa: str) -> NDArray[np.float32]:
     ``cfa`` names the filters of the top left 2 x 2 pixels, row by row, e.g. ``RGGB``. Beyond the border the picture is
     mirrored about its outermost pixels, which keeps the pattern. Raises PsvideoError for another kind of pattern.
     """
-    if cfa not in PATTERNS:
+    if cfa not in CFA_PATTERNS:
         raise PsvideoError(
-            f"colour filter pattern {cfa!r} cannot be demosaiced; expected one of {', '.join(PATTERNS)}."
+            f"colour filter pattern {cfa!r} cannot be demosaiced; expected one of {', '.join(CFA_PATTERNS)}."
         )
     from psvideo.clip.decode.malvar_kernel import demosaic_rows  # loads the compiler, which help does without
 

@@ -5,7 +5,7 @@ distance (0, negative, infinite, not a number, a PNG's largest code) says that n
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -78,11 +78,8 @@ def open_depth(path: Path, *, width_px: int, height_px: int, metres_per_unit: fl
         sequence = find_sequence(path)
         files = dict(zip(sequence.numbers, sequence.files, strict=True))
         _read(sequence.files[0], maps)
-        return DepthMaps(
-            path=path, width_px=width_px, height_px=height_px, metres_per_unit=metres_per_unit, files=files
-        )
-    still = _read(path, maps)
-    return DepthMaps(path=path, width_px=width_px, height_px=height_px, metres_per_unit=metres_per_unit, still=still)
+        return replace(maps, files=files)
+    return replace(maps, still=_read(path, maps))
 
 
 def _read(path: Path, maps: DepthMaps) -> Floats:

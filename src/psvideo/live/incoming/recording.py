@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.sequences.code_files import write_codes
-from psvideo.formats.plan_toml import FRAMES
+from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
 from psvideo.formats.whole_folders import whole_folder
 from psvideo.live.chain import LiveFrame
 from psvideo.live.incoming.source import LiveSource
 from psvideo.strobe.runlog import LOG_NAME
 
-PLAN = "plan.toml"
 MOST_WAITING_BYTES = 256_000_000
 """Codes that may wait for the disk: more than a second of most cameras."""
 
@@ -115,10 +114,10 @@ def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Record
             f"`record` {path}: {source.name} does not come as codes of 8 or 16 bits that the plan explains. Copy a "
             "clip as it is, and record from a pipe whose bare bytes `raw` names, such as gray or gray16le."
         )
-    with whole_folder(path, mark=PLAN, force=force) as folder:
+    with whole_folder(path, mark=PLAN_FILE, force=force) as folder:
         (folder / FRAMES).mkdir(exist_ok=True)
         log = source.plan_path.with_name(LOG_NAME)
-        shutil.copyfile(source.plan_path, folder / PLAN)
+        shutil.copyfile(source.plan_path, folder / PLAN_FILE)
         if log.is_file():
             shutil.copyfile(log, folder / LOG_NAME)
         record = Recording(folder=folder, waits=not source.paced)

@@ -30,7 +30,7 @@ from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
-from psvideo.runs.delivery.previews import Shown, preview_name, write_preview
+from psvideo.runs.delivery.previews import PreviewedInstant, preview_name, write_preview
 from psvideo.runs.delivery.relit import KEPT, relit_file
 from psvideo.runs.steps.caller import Caller
 from psvideo.solve.normals.illumination import illumination
@@ -69,7 +69,7 @@ def write_previews(
         names = {"relit": ("normals", "albedo"), "plates": tuple(plates)}.get(preview, (preview,))
         numbers = sorted(set.intersection(*(set(found.get(name, {})) for name in names)))
         instants = [
-            Shown(
+            PreviewedInstant(
                 number=number,
                 files={name.rpartition("/")[2]: found[name][number] for name in names},
                 relit=kept if (kept := relit_file(run.folder, number)).is_file() else None,

@@ -20,8 +20,8 @@ from psvideo.compute.memory import HALF_MAX
 from psvideo.compute.progress import Watch
 from psvideo.model.choices import Codec, Preview
 from psvideo.model.quantities import QUANTITIES
+from psvideo.pictures.on_screen import exposure_for, smaller, srgb
 from psvideo.pictures.quantity import picture_of
-from psvideo.pictures.relighting import exposure_for, smaller, srgb
 from psvideo.pictures.relit_kernel import shown_by
 from psvideo.runs.delivery.relit import TURN_S, WIDTH_PX, read_relit
 
@@ -31,7 +31,7 @@ INK = (226, 226, 226)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shown:
+class PreviewedInstant:
     """The files of one instant, by what they show; ``relit`` is its picture in the relit movie, where it was kept."""
 
     number: int
@@ -49,7 +49,7 @@ def preview_name(clip: str, preview: Preview, suffix: str) -> str:
 
 
 def write_preview(
-    path: Path, preview: Preview, instants: Sequence[Shown], *, fps: Fraction, codec: Codec, watch: Watch
+    path: Path, preview: Preview, instants: Sequence[PreviewedInstant], *, fps: Fraction, codec: Codec, watch: Watch
 ) -> None:
     """Write one movie of the instants, in the order of their numbers; a number that is not there holds the one before.
 
@@ -78,7 +78,7 @@ def write_preview(
     write_movie(path, pictures(), fps=fps, codec=codec)
 
 
-def _exposure(preview: Preview, first: Shown) -> float:
+def _exposure(preview: Preview, first: PreviewedInstant) -> float:
     """Return by which factor a whole movie's light is shown: the least that the first instant's pictures ask for."""
     measured = {"relit": ("albedo",), "normals": (), "beauty": ("beauty",)}.get(
         preview, tuple(name for name in first.files if name != "ambient")
@@ -86,13 +86,13 @@ def _exposure(preview: Preview, first: Shown) -> float:
     return min((exposure_for(_read(first.files[name], WIDTH_PX)) for name in measured), default=1.0)
 
 
-def _picture(preview: Preview, one: Shown, exposure: float, fps: Fraction) -> Pixels:
+def _picture(preview: Preview, one: PreviewedInstant, exposure: float, fps: Fraction) -> Pixels:
     if preview in QUANTITIES:
         return picture_of(preview, _read(one.files[preview], WIDTH_PX), exposure=exposure)
     return _relit(one, exposure, fps) if preview == "relit" else _sheet(one, exposure)
 
 
-def _relit(one: Shown, exposure: float, fps: Fraction) -> Pixels:
+def _relit(one: PreviewedInstant, exposure: float, fps: Fraction) -> Pixels:
     kept = None if one.relit is None else np.load(one.relit)
     picture = read_relit(one.files["normals"], one.files["albedo"], one.number, fps) if kept is None else kept
     return shown_by(_shown_as(exposure), picture)
@@ -106,7 +106,7 @@ def _shown_as(exposure: float) -> Pixels:
     return np.ascontiguousarray(srgb(light[:, None], exposure=exposure)[:, 0, 0])
 
 
-def _sheet(one: Shown, exposure: float) -> Pixels:
+def _sheet(one: PreviewedInstant, exposure: float) -> Pixels:
     """Return the plates side by side, each with its name, all at one exposure."""
     across = math.ceil(math.sqrt(len(one.files)))
     plates = {name: _read(path, WIDTH_PX // across) for name, path in one.files.items()}

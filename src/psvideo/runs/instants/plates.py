@@ -28,12 +28,9 @@ from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.beforehand import say_instants
 from psvideo.runs.delivery.delivering import plates_of
 from psvideo.runs.delivery.handover import Finished, write_previews, write_timeline
-from psvideo.runs.delivery.look import plates_sheet
+from psvideo.runs.delivery.look import SAMPLE_ROUND, plates_sheet
 from psvideo.runs.instants.reporting import observing, run_report, write_report
 from psvideo.runs.steps.output import Output, folder_of, tags_of
-
-SAMPLE_ROUND = 3
-"""The round that the report shows, counted from 1; the first where there are fewer."""
 
 
 @dataclass(frozen=True, kw_only=True)

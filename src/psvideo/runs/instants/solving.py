@@ -15,7 +15,7 @@ from psvideo.plates.part import Part
 from psvideo.plates.spread import rounds_spread
 from psvideo.report.observe.observed import Observed
 from psvideo.runs.delivery.delivering import surface_job, write_plates, write_specular
-from psvideo.runs.delivery.look import instant_sheet
+from psvideo.runs.delivery.look import SAMPLE_ROUND, instant_sheet
 from psvideo.runs.delivery.relit import blur_of
 from psvideo.runs.instants.depths import shape_of
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece, Pixels
@@ -25,8 +25,6 @@ from psvideo.solve.instants import Instant, denoised, subject_of, surfaces
 
 SPECULAR_OF_LIGHTS = "specular_of_lights"
 """The folder of what exceeds the diffuse model under each light, sequences as those of the plates."""
-SAMPLE_ROUND = 3
-"""The round that the report shows, counted from 1; the first where it is not there."""
 
 
 def write_instants(

@@ -26,7 +26,7 @@ from psvideo.clip.folder import MOVIES
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.plan_toml import read_plan
+from psvideo.formats.plan_toml import PLAN_FILE, read_plan
 from psvideo.model.camera import Encoding
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
@@ -41,7 +41,6 @@ MOST_DIFFERENT = 0.2
 exposure wrong by a quarter of a stop reaches it, and so do, of twelve photographs under other lights, some two."""
 RUN_PX = 16
 """Noise of a sum over this many pixels is a quarter of the pixels' own, beside their light."""
-PLAN = "plan.toml"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,7 +170,7 @@ def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = 
         raise PsvideoError(f"{path}: is not there. Name a folder of stills or plates, or a clip.")
     if path.is_file() and path.suffix.lower() not in MOVIES:
         raise UsageError(f"{path}: is one file. Name the folder that holds the pictures, or a movie ({MOVIES[0]}, …).")
-    plan_path = reading.plan or (path / PLAN if (path / PLAN).is_file() else None)
+    plan_path = reading.plan or (path / PLAN_FILE if (path / PLAN_FILE).is_file() else None)
     if path.is_file() or (plan_path is not None and _is_clip(path, plan_path)):
         return _of_clip(open_take(path, plan=reading.plan, frames=reading.frames), reading, watch)
     plan = None if plan_path is None else read_plan(plan_path)

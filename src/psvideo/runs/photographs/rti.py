@@ -19,7 +19,8 @@ from psvideo.export.ptm_file import write_ptm
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig, directions, intensities
-from psvideo.pictures.relighting import exposure_for, srgb_share
+from psvideo.model.srgb import srgb_share
+from psvideo.pictures.on_screen import exposure_for
 from psvideo.plates.sequence import Round
 from psvideo.solve.passes.plate_rows import BAND_PIXELS, PlateRows
 

@@ -12,7 +12,7 @@ from psvideo.clip import Clip
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError
 from psvideo.formats.light_lists.light_list_writer import write_rig
-from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.plan_toml import PLAN_FILE, format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.camera import Camera
@@ -23,7 +23,7 @@ from psvideo.runs.photographs.still_doubts import curve_doubt, dark_doubt, expos
 from psvideo.runs.photographs.still_rig import KnownLights, lens_stated
 from psvideo.solve.instants import Instant
 
-PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
+RIG, LP = "rig.toml", "lights.lp"
 SETUP = "setup"
 """The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
 NO_DARK = (
@@ -70,9 +70,9 @@ def still_clip(
         dark_s=None,
         mode="synced",
     )
-    write_text(place / PLAN, format_plan(plan))
+    write_text(place / PLAN_FILE, format_plan(plan))
     notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *lens, *_aside(pairs))
-    clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
+    clip = pictures.clip(folder, plan, place / PLAN_FILE, notes=notes)
     doubts = (warning, dark_doubt(glance, pictures, pairs.aside))
     warned = (*clip.warnings, *known.warnings, *(one for one in doubts if one))
     return StillClip(clip=replace(clip, curve_doubt=doubt or "", warnings=warned), rig=rig, rig_path=place / RIG)
@@ -141,7 +141,7 @@ def _aside(pairs: Pairs) -> tuple[str, ...]:
 def write_setup(opened: StillClip, folder: Path, instant: Instant, *, rti: bool) -> None:
     """Write what was taken for granted into the folder of results, and the relightable picture."""
     (folder / SETUP).mkdir(exist_ok=True)
-    write_text(folder / SETUP / PLAN, format_plan(opened.clip.plan))
+    write_text(folder / SETUP / PLAN_FILE, format_plan(opened.clip.plan))
     write_text(folder / SETUP / RIG, format_rig(opened.rig))
     if all(light.direction is not None for light in opened.rig.lights):
         write_rig(folder / SETUP / LP, opened.rig)

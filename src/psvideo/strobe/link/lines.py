@@ -92,11 +92,6 @@ class LineReader:
         self._too_long = False
         self._bad = False
 
-    @property
-    def is_empty(self) -> bool:
-        """True between lines."""
-        return not (self._held or self._too_long or self._bad)
-
     def feed(self, data: bytes) -> Iterator[TextLine]:
         """Take bytes in and yield every line that they end; empty lines are passed over."""
         *ends, rest = data.split(b"\n")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.model.camera import FloatArray
-from psvideo.pictures.relighting import srgb_share
+from psvideo.model.srgb import srgb_share
 
 STEPS = 1025
 SHADOW = 0.08
