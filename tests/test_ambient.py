@@ -14,6 +14,9 @@ from psvideo.model.plan import Plan
 from psvideo.model.rows.ripple import Exposures, Ripple
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient import ambient_followed, ambient_off
+from psvideo.plates.ambient.ambient_blocks import block_px, no_blocks, over_bands
+from psvideo.plates.ambient.ambient_kernel import average_rows, measure_rows
+from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
 from psvideo.plates.mixing.mixture import made
 from psvideo.plates.split import Plate, split
@@ -333,3 +336,37 @@ def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
         averaged = ambient_followed.update(averaged, dark(index, LEVEL * swing * (waves if index < 3 else 1)))
     assert averaged is not None
     assert rms(averaged.level.coded.light() - LEVEL * swing) < 1.5e-3
+
+
+@pytest.mark.parametrize("shape", [(70, 90, 3), (131, 257), (613, 701, 3)])
+def test_levels_of_blocks_are_means_and_change_steadily_between_their_middles(shape: tuple[int, ...]) -> None:
+    rng, block = np.random.default_rng(2), block_px(shape)
+    image = rng.uniform(0.01, 0.05, shape).astype(np.float32)
+    rows, cols = shape[0] // block, shape[1] // block
+    coarse, means, clipped = no_blocks(shape), np.empty(shape[0]), np.empty(shape[0], np.bool_)
+    bound = made(image).bound()
+    over_bands(lambda a, b: measure_rows(bound.mix, block, a, b, means, clipped, coarse), shape)
+    edges = [np.append(np.arange(count) * block, size) for count, size in ((rows, shape[0]), (cols, shape[1]))]
+    true = np.array(
+        [[image[a:b, c:d].mean(axis=(0, 1)) for c, d in pairwise(edges[1])] for a, b in pairwise(edges[0])]
+    ).reshape(coarse.shape)
+    assert np.allclose(coarse, true, rtol=1e-5)
+    gain = rng.uniform(0.9, 1.1, coarse.shape).astype(np.float32)
+    old, new = AmbientLevel.of(image), AmbientLevel.room(shape)
+    slots, spans = np.full((shape[0], cols), 4, np.float32), np.empty((shape[0], cols), np.float32)
+    nothing, seen = np.zeros(shape[0], np.float32), np.ones(shape[0], np.bool_)
+    restarts = np.zeros(slots.shape, np.bool_)
+    over_bands(
+        lambda a, b: average_rows(
+            bound.mix, block, 16, nothing, seen, restarts, gain.reshape(rows, -1), old.planes, slots, a, b, new.planes,
+            spans, coarse,
+        ),
+        shape,
+    )  # fmt: skip
+    middles = [(np.arange(count) + 0.5) * block - 0.5 for count in (rows, cols)]
+    down = [np.interp(np.arange(shape[0]), middles[0], column) for column in gain.reshape(rows, -1).T]
+    steady = np.stack(down, axis=1).reshape(shape[0], cols, -1)
+    across = [np.interp(np.arange(shape[1]), middles[1], line) for line in np.moveaxis(steady, 1, 2).reshape(-1, cols)]
+    level = np.moveaxis(np.array(across).reshape(shape[0], -1, shape[1]), 1, 2).reshape(shape)
+    assert np.allclose(new.coded.light(), image * level * 4 / 5, atol=2e-6)
+    assert (spans == 5).all()

@@ -116,10 +116,11 @@ def _blended(
     level, coarse, slots = AmbientLevel.room(shape), np.empty_like(ambient.coarse), np.empty_like(ambient.slots)
     bound, block, old, new = dark.picture.bound(), block_px(shape), ambient.level.planes, level.planes
     factors, seen = factor.astype(np.float32), np.ascontiguousarray(dark.seen)
+    gains = gain.reshape(len(gain), -1)
 
     def blend(first: int, last: int) -> None:
         bound.run(
-            average_rows, range(first, last), block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots,
+            average_rows, range(first, last), block, LONGEST_MEMORY, factors, seen, restarts, gains, old, ambient.slots,
             first, last, new, slots, coarse,
         )  # fmt: skip
 

@@ -14,6 +14,7 @@ from psvideo.plates.mixing.mixing_kernel import mix_row
 from psvideo.plates.mixing.mixture_arrays import Codes, Floats, MixtureArrays, lent_mix
 
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.uint32]
 Planes = tuple[Codes, Floats, Floats, Floats]
 """Of an AmbientLevel."""
 ONE, HALF = np.float32(1), np.float32(0.5)
@@ -27,11 +28,12 @@ def measure_rows(
     (row,), and the means over blocks of this many pixels a side, ``coarse`` (row, col, channel) of blocks."""
     given, found = lent_mix(mix), lent(coarse)
     line, total = np.empty(given.samples, np.float32), np.zeros(given.samples, np.float32)
+    sums = np.empty(given.samples, np.float32)
     for row in range(first, last):
         mix_row(given, row, line)
         means[row] = _sum(line) / given.samples
         clipped[row] = _any_clipped(line)
-        _into_blocks(line, total, row, block, len(means), found)
+        _into_blocks(line, total, sums, row, block, len(means), found)
 
 
 @FUSED.kept
@@ -42,16 +44,19 @@ def average_rows(
     """Average some rows of the light before, ``old``, brought to a new level, with one more picture, ``mix`` times
     ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
 
-    gain: (row, col, channel) of blocks, the new level, which changes steadily between their middles. old_slots,
+    gain: (row, col and channel) of blocks, the new level, which changes steadily between their middles. old_slots,
     restarts: (row, block), how many pictures the average spans, ``longest`` at most, and where it begins again. Filled
-    are ``new`` and ``slots`` like the old ones, and ``coarse`` like the gain with the means over blocks.
+    are ``new`` and ``slots`` like the old ones, and ``coarse`` (row, col, channel) with the means over blocks.
     """
     given, levels, found = lent_mix(mix), lent(gain), lent(coarse)
     codes, least, step, narrow = lent(new[0]), lent(new[1]), lent(new[2]), lent(new[3])
-    samples, cols, channels = given.samples, given.samples // levels.shape[2], levels.shape[2]
+    samples, channels = given.samples, found.shape[2]
+    cols = samples // channels
     line, total, then = np.empty(samples, np.float32), np.zeros(samples, np.float32), np.empty(samples, np.float32)
     share, shares = np.empty(slots.shape[1], np.float32), np.empty(samples, np.float32)
     above, below, level = np.empty(samples, np.float32), np.empty(samples, np.float32), np.empty(samples, np.float32)
+    left, right, way = np.empty(samples, np.uint32), np.empty(samples, np.uint32), np.empty(samples, np.float32)
+    _place_middles(slots.shape[1], block, channels, left, right, way)
     held = -2
     for row in range(first, last):
         unpack_row(old[0][row], old[1][row], old[2][row], then)
@@ -67,8 +72,8 @@ def average_rows(
                     for sample in range(samples):  # numba's copies of slices load texts, to say what does not fit
                         above[sample] = below[sample]
                 else:
-                    _across(levels[upper], block, above)
-                _across(levels[min(upper + 1, levels.shape[0] - 1)], block, below)
+                    _across(levels[upper], left, right, way, above)
+                _across(levels[min(upper + 1, levels.shape[0] - 1)], left, right, way, below)
                 held = upper
             mix_row(given, row, line)
             own = factor[row]
@@ -81,7 +86,7 @@ def average_rows(
             for place in range(len(share)):
                 slots[row, place] = old_slots[row, place]
         pack_row(then, codes[row], least, step, narrow[row], row, channels)
-        _into_blocks(then, total, row, block, len(seen), found)
+        _into_blocks(then, total, level, row, block, len(seen), found)
 
 
 @REORDERED.inlined
@@ -101,25 +106,43 @@ def _any_clipped(line: Floats) -> bool:
 
 
 @FUSED.inlined
-def _into_blocks(line: Floats, total: Floats, row: int, block: int, rows: int, coarse: Floats) -> None:
-    """Add a row to its blocks' sums, and store their means after the last row of theirs."""
+def _into_blocks(
+    line: Floats, total: Floats, sums: Floats, row: int, block: int, rows: int, coarse: Floats
+) -> None:  # fmt: skip
+    """Add a row to its blocks' sums, and store their means after the last row of theirs; ``sums`` is room for a row."""
     for sample in range(line.shape[0]):
         total[sample] += line[sample]
     down, across, channels = coarse.shape
     own = min(row // block, down - 1)
     if row + 1 < (rows if own == down - 1 else (own + 1) * block):
         return
-    cols = line.shape[0] // channels
+    begin, cols = (across - 1) * block, line.shape[0] // channels
     high = row + 1 - own * block
-    for place in range(across):
-        begin, end = place * block, (place + 1) * block if place < across - 1 else cols
-        scale = ONE / np.float32(high * (end - begin))
+    _add_beside(total, block, begin, channels, sums)
+    scale = ONE / np.float32(high * block)
+    for place in range(across - 1):
         for channel in range(channels):
-            mean = np.float32(0)
-            for col in range(begin, end):
-                mean += total[col * channels + channel]
-            coarse[own, place, channel] = mean * scale
+            coarse[own, place, channel] = sums[place * block * channels + channel] * scale
+    scale = ONE / np.float32(high * (cols - begin))
+    for channel in range(channels):
+        mean = np.float32(0)
+        for col in range(begin, cols):
+            mean += total[col * channels + channel]
+        coarse[own, across - 1, channel] = mean * scale
     total[:] = np.float32(0)
+
+
+@FUSED.inlined
+def _add_beside(total: Floats, block: int, end: int, channels: int, sums: Floats) -> None:
+    """Fill ``sums`` before the column ``end`` with what ``block`` pixels from there on are together: of every pixel,
+    though one of so many is wanted, since loops over neighbours become vectors."""
+    count = end * channels
+    for sample in range(count):
+        sums[sample] = total[sample]
+    for beside in range(1, block):
+        ahead = total[beside * channels : beside * channels + count]
+        for sample in range(count):
+            sums[sample] += ahead[sample]
 
 
 @FUSED.inlined
@@ -145,18 +168,24 @@ def _between(row: int, block: int, down: int) -> tuple[int, np.float32]:
 
 
 @FUSED.inlined
-def _across(gain: Floats, block: int, line: Floats) -> None:
-    """Fill a row with what is known of a row of blocks, which changes steadily between their middles."""
-    across, channels = gain.shape
-    begin, cols = block // 2, line.shape[0] // channels
-    for sample in range(begin * channels):
-        line[sample] = gain[0, sample % channels]
-    scale = ONE / np.float32(block)
-    for step in range(block):
-        part = (np.float32(step) + HALF) * scale if block > 1 else np.float32(0)
-        for left in range(across - 1):
-            at = (begin + left * block + step) * channels
-            for channel in range(channels):
-                line[at + channel] = gain[left, channel] + part * (gain[left + 1, channel] - gain[left, channel])
-    for sample in range((begin + (across - 1) * block) * channels, cols * channels):
-        line[sample] = gain[across - 1, sample % channels]
+def _place_middles(across: int, block: int, channels: int, left: Indices, right: Indices, way: Floats) -> None:
+    """Fill for every sample of a row where, in a row of blocks, those lie whose middles are on its ``left`` and
+    ``right``, one and the same beyond the outer middles, and how far it is on its ``way``."""
+    for sample in range(left.shape[0]):
+        col, channel = sample // channels, sample % channels
+        beyond = col - block // 2
+        place = min(max(beyond // block, 0), across - 1)
+        between = beyond >= 0 and place < across - 1
+        left[sample] = place * channels + channel
+        right[sample] = left[sample] + channels if between else left[sample]
+        part = (np.float32(beyond - place * block) + HALF) * (ONE / np.float32(block))
+        way[sample] = part if between and block > 1 else np.float32(0)
+
+
+@FUSED.inlined
+def _across(gain: Floats, left: Indices, right: Indices, way: Floats, line: Floats) -> None:
+    """Fill a row with what is known of a row of blocks, ``gain`` (block and channel), which changes steadily between
+    their middles."""
+    for sample in range(line.shape[0]):
+        one = gain[left[sample]]
+        line[sample] = one + way[sample] * (gain[right[sample]] - one)
