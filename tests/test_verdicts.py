@@ -698,6 +698,19 @@ def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> 
     assert not any("stand near" in line.found for line in rig_of(satin))
 
 
+def test_a_rig_is_fitted_once_until_more_is_seen() -> None:
+    seen = Footage(shape="ball", lights=6, solved=True, rounds=3).observed(0)
+    fit = seen.rig_fit
+    assert fit is not None
+    assert seen.rig_fit is fit  # a report asks three times
+    seen.light_at_points.append(0.5 * seen.light_at_points[0])
+    wider = seen.rig_fit
+    assert wider is not fit
+    assert wider is not None
+    assert seen.points is not None
+    assert wider == seen.points.fit(seen.light_at_points, seen.firing)
+
+
 @pytest.mark.parametrize(("by_surface", "named"), [(0.9, True), (0.5, False)])
 def test_lamps_are_said_to_stand_near_where_that_explains_more_than_the_surface_would(
     by_surface: float, named: bool
