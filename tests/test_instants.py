@@ -293,7 +293,7 @@ def test_motion_vectors_are_named_and_signed_as_the_program_wants_them() -> None
     flat = np.zeros((2, 2, 3), np.float32)
     surface = Surface(normals=flat, albedo=flat, valid=np.ones((2, 2), bool))
     motion = np.broadcast_to(np.array([1.0, 2.0, -3.0, -4.0], np.float32), (2, 2, 4))
-    made = Made(surface=surface, space=Space(), motion=motion, program="nuke")
+    made = Made(surface=surface, space=Space(), motion=lambda: motion, program="nuke")
     plain = {name: float(plane[0, 0]) for name, plane in planes_of("motion", made).items()}
     assert plain == {"forward.u": 1, "forward.v": 2, "backward.u": -3, "backward.v": -4}
     blender = [float(plane[0, 0]) for plane in planes_of("motion", replace(made, program="blender")).values()]

@@ -1,10 +1,22 @@
 """Motion vectors: what is plain, or goes by less than a pixel, moves with what is around it; what stands does not."""
 
+import weakref
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from psvideo.compute import spilled
+from psvideo.compute.spilled import lie_in_files
+from psvideo.export.sequences.planes import Made, planes_of
+from psvideo.export.space import Space
+from psvideo.model.surface import Surface
+from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.vectors import pixels_per_s
+from psvideo.runs.delivery.delivering import motion_of
 
 ROWS, COLS = 120, 160
 GOES = np.array([30.0, -12.0], np.float32)
@@ -60,3 +72,52 @@ def test_where_nothing_moves_vectors_are_zero() -> None:
     none = np.zeros((ROWS, COLS), np.bool_)
     assert not pixels_per_s(followed(none, ~none), (ROWS, COLS)).any()
     assert not pixels_per_s(None, (ROWS, COLS, 3)).any()
+
+
+@pytest.mark.parametrize("lies", [False, True])
+def test_vectors_of_a_file_lie_in_planes_and_large_ones_out_of_memory(
+    lies: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(spilled, "WORKED_ON_PIXELS", 1 if lies else 1 << 20)
+    outline = np.zeros((ROWS, COLS), np.bool_)
+    outline[10:20, 12:30] = True
+    motion = followed(outline, np.zeros_like(outline), 2)
+    shape, fps = (2 * ROWS, 2 * COLS, 3), Fraction(24000, 1001)
+    ways = motion_of(motion, shape, fps, tmp_path)
+    ahead = pixels_per_s(motion, shape) * np.array([1 / fps, -1 / fps], np.float32)
+    assert np.array_equal(ways, np.concatenate([ahead, -ahead], axis=-1))
+    assert ways.any()
+    assert all(ways[..., place].flags.c_contiguous for place in range(4))
+    assert lie_in_files(ways) == lies
+
+
+def test_vectors_are_made_for_their_own_file_only() -> None:
+    def never() -> np.ndarray:
+        raise AssertionError("made")
+
+    surface = Surface(
+        normals=np.zeros((ROWS, COLS, 3), np.float16),
+        albedo=np.zeros((ROWS, COLS), np.float16),
+        valid=np.ones((ROWS, COLS), np.bool_),
+    )
+    made = Made(surface=surface, space=Space(), motion=never)
+    assert len(planes_of("normals", made)) == 3
+    with pytest.raises(AssertionError, match=r"^made$"):
+        planes_of("motion", made)
+
+
+def test_no_pictures_are_held_for_those_that_correlation_looks_at_next() -> None:
+    rng = np.random.default_rng(0)
+    held: list[int] = []
+    alive: list[weakref.ref[np.ndarray]] = []
+
+    def pairs() -> Iterator[tuple[np.ndarray, ...]]:
+        for _ in range(4):
+            held.append(sum(one() is not None for one in alive))
+            pair = tuple(rng.random((ROWS, COLS), np.float32) for _ in range(2))
+            alive.extend(weakref.ref(one) for one in pair)
+            yield pair
+            del pair
+
+    assert len(displacements(pairs(), (ROWS, COLS), 2)) == 2
+    assert held == [0] * 4

@@ -37,7 +37,7 @@ def made() -> Made:
         depth=depth,
         age_s=age_s,
         passes=passes,
-        motion=np.ones((ROWS, COLS, 4)),
+        motion=lambda: np.ones((ROWS, COLS, 4)),
     )
 
 

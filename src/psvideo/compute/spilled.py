@@ -77,6 +77,13 @@ def room_for(shape: tuple[int, ...], kind: DTypeLike, spare: Path | None) -> NDA
     return in_file(shape, kind, spare)
 
 
+def room_of_planes(count: int, rows: int, cols: int, kind: DTypeLike, spare: Path | None) -> NDArray[Any]:
+    """Return so many planes of 0, (plane, row, col): where they are large and there is a folder, in a file there."""
+    if spare is None or rows * cols < WORKED_ON_PIXELS:
+        return np.zeros((count, rows, cols), kind)
+    return in_file((count, rows, cols), kind, spare)
+
+
 def kept_in(plane: NDArray[Kind], spare: Path | None) -> NDArray[Kind]:
     """Return a plane, or, where it is large and there is a folder, a copy that lies in a file there."""
     if spare is None or plane.shape[0] * plane.shape[1] < WORKED_ON_PIXELS or lie_in_files(plane):

@@ -21,7 +21,7 @@ from psvideo.model.choices import USUAL_COMPRESSION, Compression
 
 _INT32_MAX = 2**31 - 1
 AT_ONCE_ROWS = 2048
-LET_GO_EACH_BYTES = 1 << 23
+LET_GO_EACH_BYTES = 1 << 20
 """What lies in files is let go after this many rows that were looked at, and each time that this much was written."""
 
 _COMPRESSIONS: dict[Compression, object] = {
@@ -95,6 +95,7 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
     else:
         stored = values.astype(np.float32, order="C", copy=False)
         finite = bool(np.isfinite(stored).all())
+        let_go(stored)
     if not finite:
         raise ValueError(f"channel {name!r} holds NaN or infinity; missing pixels are 0 and marked in 'valid'")
     return np.asarray(stored if half else np.ascontiguousarray(stored, np.float32))

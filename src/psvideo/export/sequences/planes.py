@@ -22,8 +22,9 @@ Planes = dict[str, Image]
 class Made:
     """What an instant's files are written from; ``beauty``, ``depth``, ``age_s`` and what ``passes`` hold are None
     where nothing asks for them. ``age_s``, of rows or of pixels, is how far in time from the instant what a row shows
-    was lit. ``motion`` (row, col, 4), in pixels, x right and y up: where every pixel is one delivered frame later, and
-    one earlier, seen from where it is; it is named and signed as ``program`` wants it."""
+    was lit. ``motion`` makes, (row, col, 4), in pixels, x right and y up, where every pixel is one delivered frame
+    later, and one earlier, seen from where it is: it is the largest of all, and there only while its file is written.
+    It is named and signed as ``program`` wants it."""
 
     surface: Surface
     space: Space
@@ -31,7 +32,7 @@ class Made:
     depth: Depth | None = None
     age_s: FloatArray | None = None
     passes: Passes = field(default_factory=Passes)
-    motion: Image | None = None
+    motion: Callable[[], Image] | None = None
     program: Program | None = None
 
     @property
@@ -71,7 +72,7 @@ PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
     "reach": lambda made: None if made.passes.reach is None else made.passes.reach.astype(np.float32),
     "specular": lambda made: made.passes.specular,
     "alpha": lambda made: made.passes.alpha,
-    "motion": lambda made: made.motion,
+    "motion": lambda made: None if made.motion is None else made.motion(),
 }
 """What computes the picture of each quantity that belongs to an instant; None where it was not made."""
 
@@ -90,9 +91,13 @@ def planes_of(name: str, made: Made) -> Planes:
     if image is None:
         raise ValueError(f"{name} is to be written and was not made")
     if name == "motion" and made.program == "blender":
-        return {f"psvideo.Vector.{channel}": sign * image[..., place] for channel, place, sign in BLENDER_VECTOR}
+        return {f"psvideo.Vector.{name}": _signed(image[..., place], sign) for name, place, sign in BLENDER_VECTOR}
     channels = QUANTITIES[name].channels
     return {channel: image[..., place] if image.ndim == 3 else image for place, channel in enumerate(channels)}
+
+
+def _signed(plane: Image, sign: float) -> Image:
+    return plane if sign > 0 else -plane
 
 
 def bundled(name: str, made: Made) -> Planes:

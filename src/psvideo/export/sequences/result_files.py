@@ -124,7 +124,7 @@ def write_surface(
         depth=shape,
         age_s=age_s,
         passes=passes or Passes(),
-        motion=None if motion is None else motion(),
+        motion=motion,
         program=delivery.program,
     )
     _write_pictures(folder, clip, number, time_s, made, delivery=delivery, tags=tags)

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Clip
 from psvideo.compute.halves import halves_of
+from psvideo.compute.spilled import let_go, room_of_planes
 from psvideo.export.sequences.plate_files import plate_name, write_light, write_plate
 from psvideo.export.sequences.result_files import Delivery, write_surface
 from psvideo.export.sequences.tags import Tags
 from psvideo.model.choices import Compression
 from psvideo.plates.align.velocity.followed import Followed
-from psvideo.plates.align.velocity.vectors import pixels_per_s
+from psvideo.plates.align.velocity.vectors import fill_per_s
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
@@ -80,7 +81,9 @@ def surface_job(
         beauty=beauty,
         age_s=age_s,
         passes=_whole_picture(instant.passes),
-        motion=partial(_motion_of, one.motion, one.plates[0].shape, tags.fps) if "motion" in delivery.aovs else None,
+        motion=partial(motion_of, one.motion, one.plates[0].shape, tags.fps, folder)
+        if "motion" in delivery.aovs
+        else None,
     )
     if "relit" not in delivery.previews:
         return written
@@ -94,10 +97,20 @@ def _in_turn(*jobs: Callable[[], None]) -> None:
         job()
 
 
-def _motion_of(motion: Followed | None, shape: tuple[int, ...], fps: Fraction) -> NDArray[np.float32]:
-    """Return where every pixel is a delivered frame later and earlier, x right and y up, (row, col, 4), in pixels."""
-    ahead = pixels_per_s(motion, shape) * np.array([1 / fps, -1 / fps], np.float32)
-    return np.concatenate([ahead, -ahead], axis=-1)
+def motion_of(
+    motion: Followed | None, shape: tuple[int, ...], fps: Fraction, spare: Path | None = None
+) -> NDArray[np.float32]:
+    """Return where every pixel is a delivered frame later and earlier, x right and y up, (row, col, 4), in pixels; each
+    of the four lies in a plane of its own, as files are written. Large ones lie in a file in the folder ``spare``: at
+    1080p they take 33 MB, while the next round is followed."""
+    rows, cols = shape[:2]
+    ways = room_of_planes(4, rows, cols, np.float32, spare)
+    fill_per_s(motion, ways[:2])
+    for ahead, back, per in zip(ways[:2], ways[2:], (1 / fps, -1 / fps), strict=True):
+        ahead *= np.float32(per)
+        np.negative(ahead, out=back)
+        let_go(ahead, back)
+    return np.moveaxis(ways, 0, -1)
 
 
 def _whole_picture(passes: Passes | None) -> Passes | None:

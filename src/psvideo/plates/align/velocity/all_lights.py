@@ -123,7 +123,8 @@ class AllLights:
 
     def proposed_far(self) -> list[Vectors]:
         """Return velocities of what moved farther than flow reaches by itself."""
-        found = displacements([tuple(map(_smoothed, pair)) for pair in self.codes], FAR)
+        pairs = (tuple(map(_smoothed, pair)) for pair in self.codes)
+        found = displacements(pairs, self.codes[0][0].shape, FAR)
         some = _spread(self.count, MOST_FLOWS // FAR)
         constant = [np.empty((2, *self.shape), np.float32) for _ in found]
         for plane, (x, y) in zip(constant, found, strict=True):

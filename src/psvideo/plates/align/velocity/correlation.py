@@ -4,7 +4,7 @@ C. D. Kuglin and D. C. Hines, "The phase correlation image alignment method", IE
 with half of the whitening, which noise bears better.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import cv2
 import numpy as np
@@ -20,17 +20,20 @@ AROUND_PX = 3
 """What is so near to one displacement, or to none, is no other."""
 
 
-def displacements(pairs: Sequence[tuple[Vectors, ...]], count: int) -> list[tuple[float, float]]:
-    """Return the likeliest displacements (x right, y down, in pixels) from the first pictures to the second ones."""
+def displacements(
+    pairs: Iterable[tuple[Vectors, ...]], shape: tuple[int, ...], count: int
+) -> list[tuple[float, float]]:
+    """Return the likeliest displacements (x right, y down, in pixels) from the first pictures to the second ones, all
+    of a ``shape``; no pair is held when the next one is asked for."""
     from scipy import fft  # scipy takes 15 MB, which runs do without where nothing moves
 
-    shape = pairs[0][0].shape
     scale = max(-(-max(shape) // LARGEST_PX), 1)
     rows, cols = (max(side // scale, 1) for side in shape)
     size = cv2.getOptimalDFTSize(2 * rows), cv2.getOptimalDFTSize(2 * cols)
     total = np.zeros(size, np.float32)
     for pair in pairs:
         one, other = (cv2.resize(picture, (cols, rows), interpolation=cv2.INTER_AREA) for picture in pair)
+        del pair
         change = cv2.blur(np.abs(other - one), (CHANGED_PX, CHANGED_PX)) > CHANGED_CODES
         one, other = ((part - cv2.blur(part, (LEVEL_PX, LEVEL_PX))) * change for part in (one, other))
         cross = fft.rfft2(other, size) * np.conj(fft.rfft2(one, size))

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.plates.align.velocity.flow import Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed, odd_width
 
@@ -23,14 +24,23 @@ SMOOTH_PX = 27
 
 def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Vectors:
     """Return the velocity of every pixel of a picture (row, col[, channel]), x right and y down, (row, col, 2)."""
-    rows, cols = shape[:2]
+    planes = np.empty((2, *shape[:2]), np.float32)
+    fill_per_s(motion, planes)
+    return np.moveaxis(planes, 0, -1)
+
+
+def fill_per_s(motion: Followed | None, planes: Vectors) -> None:
+    """Fill ``planes`` (2, row, col) with the velocity of every pixel of a picture of that shape, x right and y down."""
+    rows, cols = planes.shape[1:]
     if motion is None:
-        return np.zeros((rows, cols, 2), np.float32)
-    velocity = _of_whole_things(motion)
+        planes[:] = 0
+        return
     small_rows, small_cols = motion.moves.shape
     scale = cols / small_cols, rows / small_rows
-    grown = [cv2.resize(way, (cols, rows), interpolation=cv2.INTER_LINEAR) for way in velocity]
-    return np.stack([np.float32(factor) * way for factor, way in zip(scale, grown, strict=True)], axis=-1)
+    for factor, way, plane in zip(scale, _of_whole_things(motion), planes, strict=True):
+        cv2.resize(way, (cols, rows), dst=plane, interpolation=cv2.INTER_LINEAR)
+        plane *= np.float32(factor)
+        let_go(plane)
 
 
 def _of_whole_things(motion: Followed) -> Vectors:
