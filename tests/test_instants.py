@@ -264,6 +264,7 @@ def test_the_relit_movie_is_blurred_as_the_plates_are(make_plan: PlanMaker) -> N
     """Of a matte surface that moves: what it shows under a further light is blurred as under that one it would be."""
     plan, fps = make_plan(lights=("a", "b", "c", "d"), dark=False), Fraction(24)
     ways = np.array([[0.5, 0.2, 0.85], [-0.5, 0.2, 0.85], [0.0, -0.5, 0.85], [0.1, 0.4, 0.9]])
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     rig = Rig(
         lights=tuple(Light(name=n, direction=tuple(d), intensity=(1.4,)) for n, d in zip("abcd", ways, strict=True))
     )
