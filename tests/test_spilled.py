@@ -25,7 +25,7 @@ from psvideo.solve.normals.illumination import illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable, task
 
-DIRECTIONS = [(0.5, 0.0, 0.8), (-0.5, 0.1, 0.8), (0.1, 0.5, 0.8), (-0.1, -0.5, 0.8), (0.3, 0.3, 0.8)]
+DIRECTIONS = [(0.6, 0.0, 0.8), (-0.48, 0.36, 0.8), (0.36, 0.48, 0.8), (-0.36, -0.48, 0.8), (0.48, -0.36, 0.8)]
 
 
 def plates_of(lights: int) -> list[np.ndarray]:
