@@ -92,6 +92,21 @@ def test_a_strobe_that_begins_anew_is_timed_before_and_after(share: float, plan:
     assert [flash.index for flash in timing.flashes] == list(range(len(timing.flashes)))
 
 
+@pytest.mark.parametrize(("share", "split"), [(0.37, 15), (0.37, 29)])
+def test_a_frame_that_shows_both_strobes_stands_for_no_missing_frames(share: float, split: int, plan: Plan) -> None:
+    """The frame of the break fitted 13 frames from its place, and moved all that came after it by as many."""
+    cut = 15
+    shots, profiles = with_restart(plan, share * plan.cycle_s / len(plan.cycle_slots), cut=cut)
+    profiles = profiles[:72].copy()
+    profiles[cut, :split] = shots[0].frames[cut, :split].mean(axis=1)
+    timing = find_timing(plan, np.arange(72), profiles)
+    assert timing.dropped_frames == ()
+    assert timing.repeated_frames == ()
+    assert off_s(timing, shots, plan.camera.frame_period_s, cut=cut).max() < 0.05 * plan.camera.row_time_s
+    assert sum("started again" in note for note in timing.notes) == 1
+    assert not any("No strobe like the plan's" in note for note in timing.notes)
+
+
 def test_without_a_marker_lights_keep_their_names_over_a_restart(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=48, width_px=12, dark=False)
     pitch_s = plan.cycle_s / len(plan.cycle_slots)

@@ -72,15 +72,15 @@ def _without(rows: Profiles, found: ClipFit, flashes: row_model.Flashes, one: in
     return made
 
 
-def marked(plan: Plan, found: ClipFit, flashes: Sequence[Flash], black: IntArray) -> tuple[Flash, ...]:
-    """Return flashes with those marked as incomplete of which a black frame, by its place in time, saw any."""
-    if not len(black):
+def marked(plan: Plan, found: ClipFit, flashes: Sequence[Flash], spoilt: IntArray) -> tuple[Flash, ...]:
+    """Return flashes with those marked as incomplete of which spoilt frames, by their places in time, saw any."""
+    if not len(spoilt):
         return tuple(flashes)
     start_s, duration_s = (np.array([getattr(one, name) for one in flashes]) for name in ("start_s", "duration_s"))
     first, last = frames_touched(fitted_camera(plan, found.fit), start_s, duration_s)
-    spoilt = np.searchsorted(black, first) < np.searchsorted(black, last, side="right")
+    saw = np.searchsorted(spoilt, first) < np.searchsorted(spoilt, last, side="right")
     return tuple(
-        replace(one, complete=one.complete and not lost) for one, lost in zip(flashes, spoilt.tolist(), strict=True)
+        replace(one, complete=one.complete and not lost) for one, lost in zip(flashes, saw.tolist(), strict=True)
     )
 
 

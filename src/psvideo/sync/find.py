@@ -18,6 +18,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Order, Timing
 from psvideo.model.units import counted
+from psvideo.sync.beside_breaks import doubted_places
 from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
 from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
@@ -144,7 +145,8 @@ def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
         repeated=tuple(int(number) for number in take.numbers[found.track.repeated]),
     )
     black = black_frames(plan, found)
-    seen = marked(plan, found, timing.flashes, black)
+    spoilt = np.union1d(black, doubted_places(found, take.indices))
+    seen = marked(plan, found, timing.flashes, spoilt)
     fired = without_unfired(plan, found, seen)
     notes = (
         *remarks(plan, found, steady=only_fired(found, seen, fired)),

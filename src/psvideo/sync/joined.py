@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
+from psvideo.sync.restarted import MIXED
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import brightnesses
 from psvideo.sync.rowfit.tracking.losses import losses_of
@@ -81,7 +83,7 @@ def joined(
         repeated_frames=tuple(number for one in timings for number in one.repeated_frames),
         notes=(
             *_restarts(chapters),
-            *_strobeless(without),
+            *_strobeless([span for span in without if not _beside_break(span, chapters)]),
             *dict.fromkeys(note for one in timings for note in one.notes),
         ),
         flashes=tuple(replace(flash, index=n) for n, flash in enumerate(flashes)),
@@ -97,6 +99,12 @@ def _restarts(chapters: Sequence[Chapter]) -> Iterator[str]:
             f"flash. Each part has a timing of its own: frames {spans}. Flashes beside the breaks, and frames outside "
             "of these parts, are left out."
         )
+
+
+def _beside_break(span: tuple[int, int], chapters: Sequence[Chapter]) -> bool:
+    """Return whether frames are no more than a part lacks where its strobe and the next one meet."""
+    few = span[1] - span[0] < MIXED
+    return few and any(one.last < span[0] and span[1] < other.first for one, other in pairwise(chapters))
 
 
 def _strobeless(without: Sequence[tuple[int, int]]) -> Iterator[str]:

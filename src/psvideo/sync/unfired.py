@@ -76,7 +76,8 @@ def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> NDArray[np.boo
         if level > FAINT * max(usual.values()):
             share[slot == one] = levels.value[slot == one] / level
             error[slot == one] = levels.error[slot == one] / level
-    around = _around(share, slot)
+    known = np.where([flash.complete for flash in lit], share, np.nan)
+    around = _around(known, slot)
     share, error = share / around, error / around
     off = (share < NONE) & (around > GOES_ON) & (share + SURE * error < GOES_ON)
     for one in plan.lit_slots:

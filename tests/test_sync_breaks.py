@@ -1,0 +1,93 @@
+"""A strobe that stops within a frame and begins again within one: no flash is listed as complete that never fired."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.model.rows.shutter import frames_touched
+from psvideo.model.timing import Timing, places_in_time
+from psvideo.sync.find import find_timing
+from psvideo.synth import Noise, TrueClock, TrueFlash, expose
+
+PlanMaker = Callable[..., Plan]
+PPM = 80.0
+CLEAN = Noise(full_well_e=1e7, read_e=1.0)
+
+
+def broken_off(
+    plan: Plan, seed: int, *, frames: int, stops: float, begins: float
+) -> tuple[tuple[TrueFlash, ...], FloatArray]:
+    """Return the flashes that fire, and row means (frame, row), of a strobe that stops and begins again at some times,
+    in frames."""
+    rng, period_s = np.random.default_rng(seed), plan.camera.frame_period_s
+    plates = {slot: (0.2 + 0.5 * rng.random((48, 12))).astype(np.float32) for slot in plan.lit_slots}
+    none = np.zeros((48, 12), np.float32)
+
+    def only(fires: Callable[[TrueFlash], bool]) -> Callable[[TrueFlash], NDArray[np.float32]]:
+        return lambda flash: plates[flash.slot] if flash.slot in plates and fires(flash) else none
+
+    def before(flash: TrueFlash) -> bool:
+        return flash.start_s < stops * period_s
+
+    def after(flash: TrueFlash) -> bool:
+        return flash.start_s > (begins - 1e-4) * period_s
+
+    cycle_s = plan.cycle_s * (1 + PPM * 1e-6)
+    phase_s = float(rng.uniform(0, plan.cycle_s)), begins * period_s - cycle_s * int(begins * period_s / cycle_s + 1)
+    shots = [
+        expose(
+            only(fires), plan, frames=frames, clock=TrueClock(phase_s=one, offset_ppm=PPM), ambient=light, noise=CLEAN
+        )
+        for fires, one, light in zip((before, after), phase_s, (0.02, 0.0), strict=True)
+    ]
+    fired = (*filter(before, shots[0].flashes), *filter(after, shots[1].flashes))
+    profiles = sum((shot.frames.mean(axis=2, dtype=np.float64) for shot in shots), np.zeros((frames, 48)))
+    return fired, profiles + rng.normal(0, 2e-4, profiles.shape)
+
+
+def off_rows(plan: Plan, timing: Timing, fired: tuple[TrueFlash, ...], frames: int) -> NDArray[np.float64]:
+    """Return by how much complete flashes are off the nearest of their light that fired, within the frames that saw
+    them: frames that are missing by mistake move the ones with the others."""
+    period_s = plan.camera.frame_period_s
+    number = {place: n for n, place in places_in_time(timing, range(frames)).items()}
+    first, last = frames_touched(plan.camera, timing.start_s, timing.duration_s)
+    off = []
+    for flash, begin, end in zip(timing.flashes, first.tolist(), last.tolist(), strict=True):
+        saw = range(begin, end + 1)
+        if flash.complete and flash.lights and len(saw) and all(place in number for place in saw):
+            true_s = np.array([one.start_s for one in fired if dict(one.lights) == dict(flash.lights)])
+            moved_s = {(number[place] - place) * period_s for place in saw}
+            off.append(max(np.abs(true_s - flash.start_s - one).min() for one in moved_s))
+    return np.array(off) / plan.camera.row_time_s
+
+
+@pytest.mark.parametrize(
+    ("lights", "shutter", "readout", "frames", "stops", "begins", "seed"),
+    [
+        pytest.param(5, 0.25, 1.0, 54, 22.73, 22.96, 1, id="part-ends"),
+        pytest.param(5, 0.25, 1.0, 54, 22.73, 22.96, 2, id="hole"),
+        pytest.param(4, 0.5, 0.6, 60, 25.48, 40.63, 2, id="dark"),
+        pytest.param(3, 1.0, 1.0, 57, 33.1, 35.97, 1, id="hole-and-repeats"),
+    ],
+)
+def test_flashes_beside_a_break_are_complete_only_where_they_fired(
+    lights: int,
+    shutter: float,
+    readout: float,
+    frames: int,
+    stops: float,
+    begins: float,
+    seed: int,
+    make_plan: PlanMaker,
+) -> None:
+    plan = make_plan(height_px=48, width_px=12, lights=tuple("abcde"[:lights]), shutter=shutter, readout=readout)
+    fired, profiles = broken_off(plan, seed, frames=frames, stops=stops, begins=begins)
+    timing = find_timing(plan, np.arange(frames), profiles)
+    off, period_s = off_rows(plan, timing, fired, frames), plan.camera.frame_period_s
+    assert off.max() < max(0.1, 4 * timing.phase_error_rows)
+    inside = [one for one in fired if one.lights and 2 < one.start_s / period_s < frames - 3]
+    assert len(off) > len(inside) - 6 * period_s / (plan.cycle_s / len(plan.cycle_slots))
