@@ -104,6 +104,7 @@ def test_a_job_that_cannot_be_is_refused_before_it_reaches_a_farm(clip: Path, tm
         (["--", "--nosuch"], "No such option: --nosuch"),
         (["--", "--start-number", "x"], "expected a whole number"),
         (["--", "-o", "elsewhere"], "-o after --: farm has it itself"),
+        (["--", "-oelsewhere"], "-oelsewhere after --: farm has it itself"),
         (["--", "--workers=2"], "--workers=2 after --: the farm shares the work"),
         (["--", "--resume"], "--resume after --: farm gives it to every piece"),
         (["another"], "another: farm takes one clip"),
@@ -116,3 +117,17 @@ def test_options_that_would_fail_on_the_farm_are_refused_here(
     assert main(typed) == 2
     assert says in " ".join(capsys.readouterr().err.replace("│", " ").split())
     assert not (tmp_path / "job").exists()
+
+
+def test_paths_after_the_dashes_are_whole_in_the_job(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Machines of a farm work in folders of their own."""
+    monkeypatch.chdir(tmp_path)
+    more = ["--", "--mask", "masks/m.####.png", "--timing=t.json", "--first-light", "key", "--solver", "robust"]
+    assert main(["farm", str(clip), "--rig", str(clip / "rig.toml"), "-o", "job", "-q", *more]) == 0
+    for line in (tmp_path / "job" / "commands.txt").read_text(encoding="utf-8").splitlines():
+        words = shlex.split(line)
+        assert words[words.index("--mask") + 1] == str(tmp_path / "masks" / "m.####.png")
+        assert f"--timing={tmp_path / 't.json'}" in words
+        assert words[words.index("--first-light") + 1] == "key"

@@ -1,6 +1,7 @@
 """psvideo farm: a run as a job for a render farm."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,8 +45,7 @@ def farm(
     from psvideo.runs.farm import farm as write_job
 
     voice = Voice(json=json, quiet=quiet)
-    words = options or []
-    _check_words(words)
+    words = _checked(options or [])
     lines = write_job(clip, rig=rig, out=out, results=results, plan=plan, pieces=pieces, words=words, force=force)
     voice.result({"commands": lines})
     if commands:
@@ -56,9 +56,12 @@ def farm(
         voice.say(f"{out}: a job of {cut}. See {out / 'README.txt'} for how to run it.")
 
 
-def _check_words(words: Sequence[str]) -> None:
-    """Raise as ``psvideo normals`` would where options cannot be parsed, and UsageError where a job cannot have them:
-    here, not on the farm."""
+def _checked(words: Sequence[str]) -> list[str]:
+    """Return other options of ``normals``, with whole paths: machines of a farm work in folders of their own.
+
+    Raises as ``psvideo normals`` would where options cannot be parsed, and UsageError where a job cannot have them:
+    here, not on the farm.
+    """
     from psvideo.cli.app import application
 
     group: Any = get_command(application(["normals"]))
@@ -69,9 +72,30 @@ def _check_words(words: Sequence[str]) -> None:
             "for each clip."
         )
     for name, why in OF_THE_FARM.items():
-        given = [word for word in words if word.split("=")[0] in _spellings(context, name)]
+        given = [word for word in words if _names(word, _spellings(context, name))]
         if given:
             raise UsageError(f"{given[0]} after --: {why}.")
+    return _with_whole_paths(words, context)
+
+
+def _names(word: str, spellings: Sequence[str]) -> bool:
+    """Return whether a word names an option: alone, before ``=``, or, of one letter, before its value."""
+    return word.split("=")[0] in spellings or any(len(one) == 2 and word.startswith(one) for one in spellings)
+
+
+def _with_whole_paths(words: Sequence[str], context: Any) -> list[str]:
+    given = {name for name, value in context.params.items() if isinstance(value, Path)}
+    of_paths = {one for param in context.command.params if param.name in given for one in param.opts}
+    whole: list[str] = []
+    for before, word in pairwise(["", *words]):
+        option, equals, path = word.partition("=")
+        if before in of_paths:
+            whole.append(str(Path(word).resolve()))
+        elif equals and option in of_paths:
+            whole.append(f"{option}={Path(path).resolve()}")
+        else:
+            whole.append(word)
+    return whole
 
 
 def _spellings(context: Any, name: str) -> tuple[str, ...]:
