@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from picture_file import read_picture
 
+from psvideo.formats.screen_pictures import write_png
 from psvideo.model.plan import Plan
 from psvideo.pictures.contact import GAP_PX
-from psvideo.pictures.timing_sheet import COLOURS, DARK, SIDE_PX, timing_picture, write_sheet
+from psvideo.pictures.timing_sheet import COLOURS, DARK, SIDE_PX, timing_picture
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.profiles import residuals_of
 from psvideo.synth import TrueClock, expose
@@ -37,5 +38,5 @@ def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
     for colour in (*COLOURS[: len(names)], DARK):
         squares = cv2.erode((right == colour).all(axis=2).astype(np.uint8), np.ones((12, 12), np.uint8))
         assert squares.any(), "every light's colour stands in the legend"
-    write_sheet(tmp_path / "timing.png", right.astype(np.uint8))
+    write_png(tmp_path / "timing.png", right.astype(np.uint8))
     np.testing.assert_array_equal(read_picture(tmp_path / "timing.png")[..., ::-1], right)

@@ -2,6 +2,7 @@
 
 ``plan_toml``, ``rig_toml``, ``timing_json``, ``clocks_json`` and ``flat_toml`` hold one record each; ``trace_csv`` the
 edges of a real strobe; ``rig_folder`` the rigs of several takes, ``light_lists`` those of other programs;
-``exr_files`` writes pictures. ``contract`` is what all files with a schema share, ``frame_rates`` how they write rates;
+``exr_files`` and ``screen_pictures`` write pictures. ``contract`` is what all files with a schema share,
+``frame_rates`` how they write rates;
 ``whole_files`` and ``whole_folders`` write, ``paths`` checks what callers name.
 """

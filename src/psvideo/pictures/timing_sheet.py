@@ -1,14 +1,11 @@
 """How well the flashes were found, as a picture: row profiles over time, fitted edges, what is left, and drift."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.errors import PsvideoError
-from psvideo.formats.whole_files import marked_png, whole_file
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
@@ -190,12 +187,3 @@ def _drift_in_axes(timing: Timing) -> Pixels:
     across = {number / max(count - 1, 1): str(number) for number in numbers}
     across[0.0] = "flash 0"
     return _framed(_drift(timing), across, down)
-
-
-def write_sheet(path: Path, picture: Pixels) -> None:
-    """Write a picture of R, G, B pixels as PNG, whole or not at all."""
-    done, data = cv2.imencode(".png", picture[..., ::-1])
-    if not done:
-        raise PsvideoError(f"{path}: the picture of shape {picture.shape} cannot be encoded as PNG.")
-    with whole_file(path) as beside:
-        beside.write_bytes(marked_png(data.tobytes()))

@@ -3,7 +3,6 @@
 from functools import partial
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +10,8 @@ from psvideo.clip import Clip, decoded_once, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import Space
-from psvideo.formats.whole_files import refuse_existing, whole_file
+from psvideo.formats.screen_pictures import write_png
+from psvideo.formats.whole_files import refuse_existing
 from psvideo.model.rig import Vector
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
@@ -52,7 +52,7 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
         sheet_of = partial(demo_sheet, take.clip)
         job = Job(take=take, timing=timing, lighting=lighting, delivery=delivery)
         result = normals_run(job, output, watch=watch, picture_of=sheet_of)
-    _write_png(folder / "demo.png", result.picture)
+    write_png(folder / "demo.png", result.picture)
     return folder / "demo.png"
 
 
@@ -86,11 +86,3 @@ def _surface_tiles(surface: Surface) -> list[Tile]:
         Tile("relit, warm from the right", srgb(warm, exposure=exposure)),
         Tile("relit, warm and cool together", srgb(0.7 * warm + 0.6 * cool, exposure=exposure)),
     ]
-
-
-def _write_png(path: Path, picture: NDArray[np.uint8]) -> None:
-    done, data = cv2.imencode(".png", picture[..., ::-1])
-    if not done:
-        raise ValueError(f"a picture of shape {picture.shape} cannot be encoded")
-    with whole_file(path) as beside:
-        beside.write_bytes(data.tobytes())

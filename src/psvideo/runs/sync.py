@@ -9,10 +9,11 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import PICTURE_MARK, check_ending, refuse_existing, write_text
 from psvideo.model.timing import Timing, places_in_time
-from psvideo.pictures.timing_sheet import timing_picture, write_sheet
+from psvideo.pictures.timing_sheet import timing_picture
 from psvideo.plates.naming import named_by_rig
 from psvideo.runs.steps.caller import PYTHON, Caller, said_timing, say_of_clip
 from psvideo.sync.open_take import open_take
@@ -89,4 +90,4 @@ def _draw(picture: Path, take: Take, timing: Timing, profiles: TakeProfiles) -> 
     places = places_in_time(timing, take.clip.numbers)
     shown = [n for n, number in enumerate(take.numbers) if number in places]
     index = np.array([places[take.numbers[n]] for n in shown], np.int64)
-    write_sheet(picture, timing_picture(take.plan, timing, index, profiles.value[shown]))
+    write_png(picture, timing_picture(take.plan, timing, index, profiles.value[shown]))

@@ -10,10 +10,10 @@ from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
 from psvideo.pictures.matte_sphere import matte_picture
-from psvideo.pictures.timing_sheet import write_sheet
 from psvideo.runs.calibrate.reading import picture_beside, pictures_of, reading_of, rig_out
 from psvideo.runs.steps.caller import PYTHON, Caller
 
@@ -63,7 +63,7 @@ def matte_sphere(
     outline = _found(Path(pictures), found, view) if circle is None else given_outline(view, circle)
     lights = measure_matte_sphere(found, outline, albedo=albedo)
     rig = matte_rig(lights, view)
-    write_sheet(picture, matte_picture(found, outline, lights))
+    write_png(picture, matte_picture(found, outline, lights))
     if not rig.lights:
         faults = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
         raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {picture}.")

@@ -12,9 +12,9 @@ from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
-from psvideo.pictures.timing_sheet import write_sheet
 from psvideo.runs.calibrate.reading import picture_beside, reading_of, rig_out
 from psvideo.runs.photographs.light_sets import Reading, sets_of
 from psvideo.runs.steps.caller import PYTHON, Caller
@@ -65,10 +65,10 @@ def mirror_sphere(
     try:
         sightings = _sightings([Path(path) for path in pictures], reading, looking, room, watch, caller)
     except SphereNotFoundError as fault:
-        write_sheet(picture, faulty_picture(fault.picture))
+        write_png(picture, faulty_picture(fault.picture))
         raise PsvideoError(f"{fault} See {picture}.") from None
     found = calibrate_lights(sightings, radius_m=radius_m)
-    write_sheet(picture, sphere_picture(found))
+    write_png(picture, sphere_picture(found))
     write_text(rig_path, format_rig(found.rig))
     for warning in found.warnings:
         caller.warn(warning)

@@ -10,13 +10,13 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.export.ptm_file import write_ptm
-from psvideo.formats.whole_files import whole_file, write_text
+from psvideo.formats.screen_pictures import write_jpeg
+from psvideo.formats.whole_files import write_text
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig, directions, intensities
 from psvideo.model.srgb import srgb_share
@@ -60,7 +60,7 @@ def _write_map(target: Path, base: Pixels, terms: NDArray[np.float16], lamps: Fl
     """Write planes, info.json and the .ptm of a colour (row, col, 3) and polynomials (row, col, 6)."""
     target.mkdir(parents=True, exist_ok=True)
     scale, bias = [1.0] * RED_GREEN_BLUE, [0.0] * RED_GREEN_BLUE
-    _write_plane(target / "plane_0.jpg", base)
+    write_jpeg(target / "plane_0.jpg", base, quality=QUALITY)
     ends = [np.percentile(terms[..., n], CUT_PERCENT) for n in range(TERMS)]
     low, high = np.stack(ends, axis=-1)
     span = np.maximum(high - low, 1e-3)
@@ -69,7 +69,7 @@ def _write_map(target: Path, base: Pixels, terms: NDArray[np.float16], lamps: Fl
     bias += [float(f"{value:.6g}") for value in -low / span]
     for number, first in enumerate(range(0, TERMS, 3), start=1):
         part = slice(first, first + 3)
-        _write_plane(target / f"plane_{number}.jpg", _codes(terms[..., part], low[part], span[part]))
+        write_jpeg(target / f"plane_{number}.jpg", _codes(terms[..., part], low[part], span[part]), quality=QUALITY)
     info = {
         "width": base.shape[1],
         "height": base.shape[0],
@@ -127,12 +127,3 @@ def _codes(plane: NDArray[np.floating], low: FloatArray, span: FloatArray) -> Pi
     for row, shown in zip(plane, codes, strict=True):
         shown[:] = 255 * np.clip((row - low) / span, 0, 1) + 0.5
     return codes
-
-
-def _write_plane(path: Path, codes: Pixels) -> None:
-    whole_colour = [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
-    done, data = cv2.imencode(".jpg", codes[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY, *whole_colour])
-    if not done:
-        raise ValueError(f"a plane of shape {codes.shape} cannot be encoded")
-    with whole_file(path) as beside:
-        beside.write_bytes(data.tobytes())
