@@ -52,6 +52,23 @@ def test_of_few_lights_or_points_nothing_is_said(lights: int, points: int) -> No
     assert lamp_strengths(light[:points], sent) is None
 
 
+@pytest.mark.parametrize("gives", [0.05, 1.0])
+def test_a_light_that_the_rig_calls_weak_is_measured_as_strong_as_it_is(gives: float) -> None:
+    light, sent = scene(8, near=False, seed=0)
+    light, sixth = np.where(np.arange(8) == 5, gives, 1.0) * light, np.arange(8) == 5
+    found = lamp_strengths(light, sent * np.where(sixth, 0.05, 1.0)[:, None])
+    assert found is not None
+    np.testing.assert_allclose(
+        found.ratios, TRUE[:8] / np.median(TRUE[:8]) * np.where(sixth, gives / 0.05, 1), rtol=0.02
+    )
+
+
+def test_a_light_so_weak_that_a_black_level_counts_for_it_says_nothing() -> None:
+    light, sent = scene(8, near=False, seed=0)
+    weak = np.where(np.arange(8) == 5, 0.012, 1.0)
+    assert lamp_strengths(light * weak, sent * weak[:, None]) is None
+
+
 def test_of_a_light_that_reaches_hardly_anything_nothing_is_said() -> None:
     light, sent = scene(8, near=False, seed=0)
     assert lamp_strengths(light * np.where(np.arange(8) == 5, 0.03, 1.0), sent) is None

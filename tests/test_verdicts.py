@@ -688,6 +688,21 @@ def test_strengths_are_told_beside_a_light_that_is_dead(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("share", [0.07, 0.3])
+def test_strengths_are_told_beside_a_light_that_the_rig_calls_weak(share: float, seed: int) -> None:
+    """Under a tenth of the others' it was in shadow everywhere, and of no light was said how strong it is."""
+    gains = [share, 1.2, 1.0, 0.8, 1.0, 1.0, 1.0, 1.0]
+    off, right = (
+        Footage(shape="waves", lights=8, gains=own, claimed_gain=share, sheen=(0.2, 12), solved=True).observed(seed)
+        for own in (gains, [share] + [1.0] * 7)
+    )
+    assert any("'light3' 8" in one.found and "'light0'" not in one.found for one in rig_but_leaning(off))
+    assert "not as strong" in " ".join(one.found for one in result.accuracy(off))
+    assert right.rig_fit is not None
+    assert not any("not as strong" in one.found or "other strengths" in one.found for one in rig_of(right))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> None:
     satin = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(seed)
     fit = satin.rig_fit

@@ -6,12 +6,16 @@ As ``calibrate/cho2020.py`` measures them, on the points at which a report looks
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.calibrate.cho2020 import LEAST_REACHED, fitted
 from psvideo.model.camera import FloatArray
 
 SHADOW = 0.1
 """A light reaches a point that gets this share of the brightest one's from it."""
+WEAK, FAINT = 0.25, 0.01
+"""A light that the rig says is weaker than the first share of the strongest reaches a point by what it sends, too. Less
+light than the second, of full scale, says nothing of such a light: black levels are off by up to a tenth of it."""
 LEAST_POINTS, MOST_POINTS = 100, 800
 """Of fewer, under every light, nothing is said; so many are enough."""
 FEWEST_LIGHTS = 8
@@ -31,11 +35,21 @@ class LampStrengths:
     turned_deg: float
 
 
+def reaches(light: FloatArray, vectors: FloatArray, share: float) -> NDArray[np.bool_]:
+    """Return which lights reach a point, (point, light): they give more than a share of the brightest one's ``light``,
+    as it is or, of lights that the rig calls weak, over what it sends, ``vectors`` (point or 1, light, 3)."""
+    sizes = np.maximum(np.linalg.norm(vectors, axis=2), 1e-12)
+    even = light / sizes
+    by_rig = (even > share * even.max(axis=1, keepdims=True)) & (light > FAINT)
+    weak = sizes < WEAK * sizes.max(axis=1, keepdims=True)
+    return np.asarray((light > share * light.max(axis=1, keepdims=True)) | (by_rig & weak))
+
+
 def lamp_strengths(light: FloatArray, vectors: FloatArray) -> LampStrengths | None:
     """Return the strengths that explain points best: ``light`` (point, light), 0 where it is not known, and
     ``vectors`` (point or 1, light, 3), what the rig sends there. None under fewer than FEWEST_LIGHTS, or where
     a light reaches too few points."""
-    used = (light > SHADOW * light.max(axis=1, keepdims=True)) & (light > 0)
+    used = reaches(light, vectors, SHADOW) & (light > 0)
     enough = np.flatnonzero(used.sum(axis=1) >= LEAST_REACHED)
     if light.shape[1] < FEWEST_LIGHTS or len(enough) < LEAST_POINTS:
         return None

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.report.observe.rig_and_curve.lamp_strengths import LampStrengths, lamp_strengths
+from psvideo.report.observe.rig_and_curve.lamp_strengths import LampStrengths, lamp_strengths, reaches
 from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
 from psvideo.report.observe.rig_and_curve.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
 
@@ -50,7 +50,7 @@ def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = 
     count = light.shape[1]
     peak = light.max(axis=1)
     lit = peak > LEAST_LIGHT * 1e-3
-    reached = (light.min(axis=1) > SHADOW * peak) & lit
+    reached = reaches(light, vectors, SHADOW).all(axis=1) & lit
     if count < 4 or reached.sum() < LEAST_POINTS:
         return None
     unit = light[reached] / np.linalg.norm(light[reached], axis=1, keepdims=True)
