@@ -28,7 +28,7 @@ from psvideo.page.picture import PagePicture
 from psvideo.runs.live import live
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Playwright
+    from playwright.sync_api import Page, Playwright
 
 Served = tuple[LivePage, NewestPictures, list[NewestRound], Camera, Path]
 
@@ -211,14 +211,29 @@ def test_the_frame_is_marked_where_lights_and_the_dark_row_are(served: Served) -
                 assert (float(inside.max()) > 0.1) == bool(name)
 
 
+SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+@pytest.fixture(scope="module")
+def browsing(served: Served, playwright: "Playwright", chromium: str) -> "Iterator[Page]":
+    """The live page with a picture, in a browser that draws by software."""
+    page, pictures, results, camera, _ = served
+    pictures.put(results[-1], camera)
+    browser = playwright.chromium.launch(executable_path=chromium, args=SOFTWARE)
+    tab = browser.new_page(viewport={"width": 640, "height": 400})
+    tab.goto(page.url)
+    tab.wait_for_selector("body[data-drawn]", timeout=20_000)
+    yield tab
+    browser.close()
+
+
 def test_the_browser_relights_the_surface_that_was_solved(
     served: Served, playwright: "Playwright", chromium: str
 ) -> None:
     page, pictures, results, camera, _ = served
     newest = results[-1]
     pictures.put(newest, camera)
-    software = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    browser = playwright.chromium.launch(executable_path=chromium, args=software)
+    browser = playwright.chromium.launch(executable_path=chromium, args=SOFTWARE)
     try:
         tab = browser.new_page(viewport={"width": 640, "height": 400})
         tab.goto(page.url)
@@ -234,3 +249,42 @@ def test_the_browser_relights_the_surface_that_was_solved(
     expected = albedo * np.maximum(normals @ direction, 0)[..., None]
     relit = np.reshape(found, (*normals.shape[:2], 4))[..., :3]
     assert np.abs(relit - expected).max() < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("share", "took_ms", "expected"),
+    [
+        (1, [20.0] * 5, 0.8),
+        (0.8, [20.0] * 5, 0.6),
+        (0.6, [20.0] * 5, 0.6),
+        (1, [20.0] * 4, 1),  # too few to say
+        (1, [2.0, 2.0, 2.0, 90.0, 90.0], 1),  # two of five are anybody's
+        (0.6, [3.0] * 5, 0.6),  # at 0.8 they would take 5.3 ms
+        (0.6, [1.0] * 5, 0.8),
+        (0.8, [1.0] * 5, 1),
+        (1, [1.0] * 5, 1),
+    ],
+)
+def test_how_many_pixels_are_drawn_follows_from_what_drawing_takes(
+    browsing: "Page", share: float, took_ms: list[float], expected: float
+) -> None:
+    assert browsing.evaluate("([share, took]) => psvideoLive.shareAfter(share, took)", [share, took_ms]) == expected
+
+
+def test_where_software_draws_slowly_fewer_pixels_are_drawn_and_they_fill_the_page(
+    served: Served, browsing: "Page"
+) -> None:
+    _, pictures, results, camera, _ = served
+    browsing.set_viewport_size({"width": 2400, "height": 1600})  # more than software draws in 8 ms
+    box = "document.getElementById('picture').getBoundingClientRect().width"
+    width = browsing.evaluate(box)
+    until_s = time.monotonic() + 60
+    while abs((drawn := browsing.evaluate("document.getElementById('picture').width")) - 0.6 * width) > 1:
+        assert time.monotonic() < until_s, f"{drawn} of {width} pixels are drawn"
+        pictures.put(results[-1], camera)
+        time.sleep(0.02)
+    assert browsing.evaluate(box) == width
+    labels = browsing.evaluate(
+        "[...document.querySelectorAll('#labels span')].map((one) => parseFloat(one.style.left))"
+    )
+    assert max(labels) > 0.5 * width, "names stand at their panes, wherever these are drawn"

@@ -14,6 +14,39 @@ let seen = 0;
 let drawn = 0;
 let chosen = "";
 
+// Software that draws needs time for every pixel, and takes it from the frames. Where drawing takes longer than
+// MOST_DRAW_MS, a share of the pixels a side is drawn and the browser stretches them: a picture that comes late shows less.
+const MOST_DRAW_MS = 8;
+const DRAWN_SHARES = [1, 0.8, 0.6];
+const JUDGED_BY = 5; // drawings until their median is judged
+const UNTIMED = 7; // drawings that follow where the share stays: to wait for the renderer takes time, too
+const pace = { share: DRAWN_SHARES[0], took: [], passed: 0 };
+
+function shareAfter(share, took) {
+  if (took.length < JUDGED_BY) return share;
+  const median = [...took].sort((one, other) => one - other)[took.length >> 1];
+  const at = DRAWN_SHARES.indexOf(share);
+  if (median > MOST_DRAW_MS) return DRAWN_SHARES[Math.min(at + 1, DRAWN_SHARES.length - 1)];
+  const larger = DRAWN_SHARES[Math.max(at - 1, 0)];
+  return median * (larger / share) ** 2 < MOST_DRAW_MS / 2 ? larger : share;
+}
+
+// Draw, and see now and then how long it takes until the renderer has done all that it was given.
+function drawTimed() {
+  pace.passed += 1;
+  if (pace.took.length === 0 && pace.passed <= UNTIMED) {
+    drawPanes();
+    return;
+  }
+  const began = performance.now();
+  drawPanes();
+  stage.finish();
+  pace.took.push(performance.now() - began);
+  if (pace.took.length < JUDGED_BY) return;
+  const share = shareAfter(pace.share, pace.took);
+  Object.assign(pace, { share, took: [], passed: share === pace.share ? 0 : UNTIMED });
+}
+
 function look(kind, main, exposure) {
   return { kind, main, blocks: held, from: "live", sequence: { y: "up", kind }, exposure, toCamera: SAME, origin: [0, 0, 0],
     aspect: held[main].height / held[main].width, range: [0, 1], place: { id: null, kind: 0, middle: [0, 0, 0], scale: 1 },
@@ -33,7 +66,7 @@ function paneLooks() {
 
 function drawPanes() {
   const box = at("viewer").getBoundingClientRect();
-  const scale = Math.min(window.devicePixelRatio || 1, 2);
+  const scale = Math.min(window.devicePixelRatio || 1, 2) * pace.share;
   stage.resize(Math.round(box.width * scale), Math.round(box.height * scale));
   stage.clear();
   const panes = paneLooks();
@@ -196,7 +229,7 @@ function connect() {
     }
     if (pictures > 0) return;
     requestAnimationFrame(() => {
-      drawPanes();
+      drawTimed();
       drawn += 1;
       document.body.dataset.drawn = String(drawn);
       if (held.frame) document.dispatchEvent(new CustomEvent("drawn", { detail: held.frame.facts }));
@@ -211,6 +244,6 @@ at("viewer").onpointermove = (moved) => {
   const box = at("viewer").getBoundingClientRect();
   light.direction = directionAt(2 * (moved.clientX - box.left) / box.width - 1, 1 - 2 * (moved.clientY - box.top) / box.height);
 };
-globalThis.psvideoLive = { held, relit: () => stage.relitValues(look("relit", "normals", 1)) };
+globalThis.psvideoLive = { held, shareAfter, relit: () => stage.relitValues(look("relit", "normals", 1)) };
 if (stage) connect();
 else at("state").textContent = "This browser has no WebGL 2, which the live view needs.";

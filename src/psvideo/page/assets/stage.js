@@ -102,6 +102,12 @@ class Stage {
     gl.clear(gl.COLOR_BUFFER_BIT);
   }
 
+  // Wait until the renderer has drawn all that it was given: to read a pixel needs it.
+  finish() {
+    const gl = this.gl;
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
   // Draw one pane into a rectangle of the canvas in its pixels, from the top left; `cut` is the part that may be drawn.
   draw(look, rect, cut) {
     const gl = this.gl;
