@@ -21,6 +21,9 @@ FPS, BAR_DB = 24, 35.0
 VIEWS = 21
 """Instants at which the truth is rendered while the shutter is open."""
 EDGE_PX = 6
+RAYS = 3
+"""Points a side that a pixel which is seen whole sees. A camera's pixels see their area; seen at one point, wires that
+are thinner than a pixel, and their shadows, flicker as no camera shows them."""
 
 
 class Line(NamedTuple):
@@ -36,20 +39,25 @@ class Line(NamedTuple):
     met: bool
 
 
-SCENES: dict[str, tuple[str, int, dict[str, Any]]] = {
-    "bust, turning 30 degrees a second": ("bust", 192, {"axis": [0.0, 1.0, 0.0], "spin_deg_per_s": 30.0}),
-    "fan, 20 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 120.0}),
-    "fan, 120 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 720.0}),
-    "fan, 720 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 4320.0}),
+SCENES: dict[str, tuple[str, int, dict[str, Any], int]] = {
+    "bust, turning 30 degrees a second": ("bust", 192, {"axis": [0.0, 1.0, 0.0], "spin_deg_per_s": 30.0}, 1),
+    "fan, 20 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 120.0}, 1),
+    "fan, 120 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 720.0}, 1),
+    "fan, 720 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 4320.0}, 1),
+    "fan, pixels seen whole, 20 turns": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 120.0}, RAYS),
+    "fan, pixels seen whole, 60 turns": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 360.0}, RAYS),
+    "fan, pixels seen whole, 120 turns": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 720.0}, RAYS),
 }
 
 
-def small_scene(name: str, width_px: int, motion: dict[str, Any], folder: Path) -> Path:
-    """Write a scene of the repository smaller, without ambient light, its first object moving."""
+def small_scene(name: str, width_px: int, motion: dict[str, Any], folder: Path, *, rays: int = 1) -> Path:
+    """Write a scene of the repository smaller, without ambient light, its first object moving; ``rays`` a side see a
+    pixel."""
     scene = tomlkit.parse(builtin_scene(name).read_text(encoding="utf-8")).unwrap()
     camera = scene["camera"]
     camera["height_px"] = round(camera["height_px"] * width_px / camera["width_px"])
     camera["width_px"] = width_px
+    camera["rays"] = rays
     scene["frames"] = 24
     scene["ambient"] = {"level": 0.0}
     scene["object"][0]["motion"] = motion
@@ -60,10 +68,10 @@ def small_scene(name: str, width_px: int, motion: dict[str, Any], folder: Path) 
 
 def rows() -> Iterator[Line]:
     """Film every scene, and open the shutter by 180 degrees."""
-    for what, (name, width_px, motion) in SCENES.items():
+    for what, (name, width_px, motion, rays) in SCENES.items():
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary)
-            scene = small_scene(name, width_px, motion, folder)
+            scene = small_scene(name, width_px, motion, folder, rays=rays)
             clip = ps.shoot(scene, folder / "clip").path
             stage = set_stage(read_scene(scene), builtin_scene(name).parent)
             sharp = beauties(clip, folder / "round", fps="round")
