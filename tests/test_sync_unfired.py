@@ -97,6 +97,24 @@ def test_a_light_that_dies_is_named_from_when_it_does(share: float, plan: Plan) 
     assert not any("exposure or gain" in note for note in timing.notes)
 
 
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_a_dead_light_has_no_flash_below_360_degrees_either(share: float, make_plan: PlanMaker) -> None:
+    """Flashes that fall between two exposures show hardly any of themselves: those of a dead light were complete."""
+    plan = make_plan(height_px=48, width_px=12, shutter=0.25, readout=0.6, dark=False)
+    slot, period_s = plan.lit_slots[1], plan.camera.frame_period_s
+    from_s = share * FRAMES * period_s
+    shot = shot_of(plan, lambda flash: flash.slot == slot and flash.start_s > from_s)
+    profiles = shot.frames.mean(axis=2, dtype=np.float64)
+    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    name = next(note.split(":")[0] for note in timing.notes if "never fired" in note)
+    dead_s = np.array([one.start_s for one in shot.flashes if one.slot == slot and one.start_s > from_s])
+    complete_s = np.array([one.start_s for one in timing.flashes if one.complete])
+    assert np.abs(complete_s[:, None] - dead_s).min() > 5 * plan.camera.row_time_s
+    fired = [one for one in inside(plan, shot) if one.slot == slot and one.start_s < from_s]
+    named = [one for one in timing.flashes if one.complete and name in one.lights]
+    assert len(named) >= len(fired) - 2
+
+
 def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(plan: Plan) -> None:
     shot = shot_of(plan, lambda _: False, fade=0.02)
     timing = timing_of(plan, shot)

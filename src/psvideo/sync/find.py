@@ -30,7 +30,7 @@ from psvideo.sync.rowfit.restarts import may_restart, odd_somewhere
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.turns import turns
 from psvideo.sync.unbroken import unbroken
-from psvideo.sync.unfired import only_fired, remarks_on_unfired, without_unfired
+from psvideo.sync.unfired import incomplete, only_fired, remarks_on_unfired, unfired_of
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
@@ -147,7 +147,9 @@ def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
     black = black_frames(plan, found)
     spoilt = np.union1d(black, doubted_places(found, take.indices))
     seen = marked(plan, found, timing.flashes, spoilt)
-    fired = without_unfired(plan, found, seen)
+    unfired = unfired_of(plan, found, seen)
+    seen = incomplete(seen, unfired.beside)
+    fired = incomplete(seen, unfired.never)
     notes = (
         *remarks(plan, found, steady=only_fired(found, seen, fired)),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),

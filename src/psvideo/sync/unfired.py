@@ -56,18 +56,45 @@ class _Levels:
     error: FloatArray
 
 
-def without_unfired(plan: Plan, found: ClipFit, flashes: Sequence[Flash]) -> tuple[Flash, ...]:
-    """Return a clip's flashes, in order, with those marked as incomplete that give no light where others go on.
-    ``found`` is the fit under the lights' names."""
+@dataclass(frozen=True, kw_only=True)
+class Unfired:
+    """Flashes by their ``index``: those that ``never`` fired, and those of the same lights ``beside`` them of which too
+    little was seen to know."""
+
+    never: frozenset[int]
+    beside: frozenset[int]
+
+
+def unfired_of(plan: Plan, found: ClipFit, flashes: Sequence[Flash]) -> Unfired:
+    """Return which of a clip's flashes, in order, give no light where others go on. ``found`` is the fit under the
+    lights' names.
+
+    A flash of which too little was seen, as below 360 degrees most that fall between two exposures, is one where those
+    of its light before and after are, and may be one where one of them is.
+    """
     lit = [flash for flash in flashes if not flash.is_dark]
     if not lit:
-        return tuple(flashes)
-    dead = {flash.index for flash, off in zip(lit, _unfired(plan, found, lit), strict=True) if off}
-    return tuple(replace(one, complete=one.complete and one.index not in dead) for one in flashes)
+        return Unfired(never=frozenset(), beside=frozenset())
+    off, told = _unfired(plan, found, lit)
+    never, beside = set[int](), set[int]()
+    for slot in plan.lit_slots:
+        own = [n for n, flash in enumerate(lit) if flash.slot == slot]
+        known = [n for n in own if told[n]]
+        for n in own:
+            around = (next((k for k in reversed(known) if k <= n), None), next((k for k in known if k >= n), None))
+            dead = [bool(off[k]) for k in around if k is not None]
+            if any(dead):
+                (never if all(dead) else beside).add(lit[n].index)
+    return Unfired(never=frozenset(never), beside=frozenset(beside))
 
 
-def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> NDArray[np.bool_]:
-    """Return which of the lit flashes never fired, shape (flash,)."""
+def incomplete(flashes: Sequence[Flash], those: frozenset[int]) -> tuple[Flash, ...]:
+    """Return flashes with some of them, by their ``index``, marked as incomplete."""
+    return tuple(replace(one, complete=one.complete and one.index not in those) for one in flashes)
+
+
+def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which of the lit flashes never fired, and of which enough was seen to tell, both of shape (flash,)."""
     slot = np.array([flash.slot for flash in lit])
     levels = _levels(plan, found, lit)
     share, error = np.full(len(lit), np.nan), np.full(len(lit), np.inf)
@@ -84,7 +111,7 @@ def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> NDArray[np.boo
         fired = share[(slot == one) & (share > GOES_ON)]
         scatter = 1.4826 * float(np.median(np.abs(fired - np.median(fired)))) if len(fired) >= LEAST_FIRED else np.inf
         off &= (slot != one) | (1 - share > SURE * scatter)
-    return off
+    return off, np.isfinite(share) & (around > GOES_ON)
 
 
 def _usual(level: FloatArray) -> float:
