@@ -291,8 +291,8 @@ def test_no_more_plates_are_held_than_instants_need(
                 yield own
                 del own
 
-    def watched(picture: Mixture, saturation: float, put_by: PutBy | None = None) -> Mixture:
-        small = packed(picture, saturation, put_by)
+    def watched(picture: Mixture, saturation: float, put_by: PutBy | None = None, **known: Any) -> Mixture:
+        small = packed(picture, saturation, put_by, **known)
         count(np.asarray(small.frames[0].codes))
         return small
 

@@ -112,5 +112,7 @@ def test_a_packed_picture_is_good_to_half_a_step_and_black_stays_black(least: fl
     image[5] = 0
     image[6, 0, 0], image[6, 1, 0] = least, most
     back = packed(made(image), saturation=100.0).image()
+    span = float(image.min()), float(image.max())
+    assert (packed(made(image), saturation=100.0, span=span).image() == back).all()  # found while it is made
     assert np.abs(back - image).max() <= 0.502 * (most - min(least, 0)) / 65534  # floats round too
     assert (back[5] == 0).all()

@@ -32,9 +32,10 @@ def _of(lanes: tuple[float, ...]) -> Any:
     return _ir.Constant(_FOUR, [_ir.Constant(_FLOAT, lane) for lane in lanes])
 
 
-def _chosen(builder: Any, vector: Any, lanes: tuple[int, ...]) -> Any:
-    """A vector of some lanes of another."""
-    return builder.shuffle_vector(vector, vector, _ir.Constant(_ir.VectorType(_INT, 4), [_INT(lane) for lane in lanes]))
+def _chosen(builder: Any, vector: Any, lanes: tuple[int, ...], other: Any = None) -> Any:
+    """A vector of some lanes of another, or of two."""
+    places = _ir.Constant(_ir.VectorType(_INT, 4), [_INT(lane) for lane in lanes])
+    return builder.shuffle_vector(vector, vector if other is None else other, places)
 
 
 def _spread(builder: Any, value: Any) -> Any:
@@ -71,8 +72,15 @@ def _down(builder: Any, arguments: Any, vectors: int) -> list[Any]:
     return total
 
 
-def _lane(builder: Any, vectors: list[Any], place: int) -> Any:
-    return builder.extract_element(vectors[place // 4], _INT(place % 4))
+def _pixels(builder: Any, first: Any, second: Any, third: Any) -> tuple[Any, ...]:
+    """Four pixels of three samples, each in a vector of its own, whose last lane is of no use: what is then added are
+    vectors, where a sum of each channel would take every lane out by itself."""
+    return (
+        first,
+        _chosen(builder, first, (3, 4, 5, 3), second),
+        _chosen(builder, second, (2, 3, 4, 2), third),
+        _chosen(builder, third, (1, 2, 3, 1)),
+    )
 
 
 def _cubic_of_three(typing_context: Any, address: Any, stride: Any, across: Any, down: Any) -> Any:
@@ -86,11 +94,9 @@ def _cubic_of_three(typing_context: Any, address: Any, stride: Any, across: Any,
             builder.fmul(_chosen(builder, weights, tuple(place // 3 for place in range(4 * n, 4 * n + 4))), vector)
             for n, vector in enumerate(_down(builder, arguments, 3))
         ]
-        sums = []
-        for channel in range(3):
-            one, two, three, four = (_lane(builder, samples, channel + 3 * pixel) for pixel in range(4))
-            sums.append(builder.fadd(builder.fadd(one, two), builder.fadd(three, four)))
-        return context.make_tuple(builder, made, sums)
+        one, two, three, four = _pixels(builder, *samples)
+        total = builder.fadd(builder.fadd(one, two), builder.fadd(three, four))
+        return context.make_tuple(builder, made, [builder.extract_element(total, _INT(lane)) for lane in range(3)])
 
     return made(types.intp, types.intp, types.float32, types.float32), generate
 
@@ -100,8 +106,8 @@ def _cubic_of_one(typing_context: Any, address: Any, stride: Any, across: Any, d
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (line,) = _down(builder, arguments, 1)
-        samples = [builder.fmul(_weights(builder, arguments[2]), line)]
-        one, two, three, four = (_lane(builder, samples, pixel) for pixel in range(4))
+        samples = builder.fmul(_weights(builder, arguments[2]), line)
+        one, two, three, four = (builder.extract_element(samples, _INT(pixel)) for pixel in range(4))
         return builder.fadd(builder.fadd(one, two), builder.fadd(three, four))
 
     return types.float32(types.intp, types.intp, types.float32, types.float32), generate

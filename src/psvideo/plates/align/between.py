@@ -75,15 +75,18 @@ def plate_at(
 
     sources, columns = (source, source if guess is None else guess), columns_in(cols, source.shape[1])
 
-    def fill(top: int, bottom: int) -> None:
+    def fill(top: int, bottom: int) -> tuple[float, float]:
         _fill(range(top, bottom), image, seen, own, sides, sources, motion, columns)
+        made_now = image[top:bottom]  # while it lies in a core's cache
+        return float(made_now.min()), float(made_now.max())
 
-    over_ranges(fill, rows, each=BAND_ROWS)
+    spans = over_ranges(fill, rows, each=BAND_ROWS)
+    span = min(least for least, _ in spans), max(most for _, most in spans)
     return LightPlate(
         light=own.light,
         number=number,
         time_s=motion.time_s,
-        picture=packed(made(image), own.saturation, put_by),
+        picture=packed(made(image), own.saturation, put_by, span=span),
         seen=seen,
         saturation=own.saturation,
         shown_s=own.flashed_s,

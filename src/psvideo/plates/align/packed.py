@@ -16,14 +16,18 @@ PutBy = Callable[[NDArray[Any]], NDArray[Any] | StoredCodes]
 """Puts codes by where they take no memory, if there is such a place; else returns them."""
 
 
-def packed(picture: Mixture, saturation: float, put_by: PutBy | None = None) -> Mixture:
+def packed(
+    picture: Mixture, saturation: float, put_by: PutBy | None = None, *, span: tuple[float, float] | None = None
+) -> Mixture:
     """Return a picture in half its memory, or none, good to half a step of its codes; black and what is saturated stay
-    so. One that is not made yet is held by its frames, and comes back as it is.
+    so. One that is not made yet is held by its frames, and comes back as it is. ``span`` is its least light and its
+    most, where they are known.
     """
     if not picture.is_made:
         return picture
     image = picture.image()
-    least, most = min(float(image.min()), 0.0), max(float(image.max()), 0.0)
+    least, most = span or (float(image.min()), float(image.max()))
+    least, most = min(least, 0.0), max(most, 0.0)
     step = max((most - least) / (MOST_CODE - 1), 1e-12)
     zero = float(np.ceil(-least / step))
     codes = np.empty(image.shape, np.uint16)
