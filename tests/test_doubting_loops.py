@@ -17,6 +17,7 @@ from psvideo.solve.normals.trust import thin_surface as thin
 from psvideo.solve.normals.trust import torn as of_torn
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.fewer_lights import widened
+from psvideo.solve.normals.trust.judging_kernel import add_rows
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
@@ -186,3 +187,18 @@ def test_where_nothing_is_known_nothing_is_doubted_and_nothing_is_no_number() ->
     signs = signs_of(empty, one)
     assert not signs.misfit_deg.any()
     assert np.isfinite(doubt_deg(signs)).all()
+
+
+@pytest.mark.parametrize(("shape", "step"), [((41, 63), 4), ((9, 16), 5), ((6, 7), 1)])
+def test_what_is_known_at_points_changes_steadily_between_them(shape: tuple[int, int], step: int) -> None:
+    rng = np.random.default_rng(7)
+    more = rng.uniform(1, 9, [-(-size // step) for size in shape]).astype(np.float32)
+    errors = rng.uniform(0.5, 3, shape).astype(np.float32)
+    errors[2, 3] = 0
+    found = errors.copy()
+    for first in range(0, shape[0], 5):
+        add_rows(found, more, step, first, min(first + 5, shape[0]))
+    points = [np.arange(count) * step for count in more.shape]
+    down = np.stack([np.interp(np.arange(shape[0]), points[0], line) for line in more.T], axis=1)
+    between = np.stack([np.interp(np.arange(shape[1]), points[1], line) for line in down])
+    assert np.allclose(found, np.hypot(errors, between) * (errors > 0), rtol=1e-5)

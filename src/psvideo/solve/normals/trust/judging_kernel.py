@@ -1,6 +1,7 @@
 """The compiled loops of judging: noise through least squares and what is doubted beyond it, and light in shadow."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
@@ -9,6 +10,7 @@ from psvideo.solve.normals.loops.measuring import read_block
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Samples, Spread, Task, Work
 
+Places = NDArray[np.uint32]
 TWO, MOST_FIT_DEG, LARGEST_DEG = np.float32(2), np.float32(60), np.float32(180)
 FACING = np.float32(0.05)  # the cosine up to which a light passes a surface by, where such light was not used
 SHADOWED = np.float32(0.25)  # of what a light would give, below which it is hindered
@@ -42,15 +44,17 @@ def judge_rows(
     trace, holds_fit = xx + yy + zz, f.size > 0
     beyond, usual = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
     sizes, means = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
+    ends, place, way = np.empty((2, cols), np.float32), np.empty(cols, np.uint32), np.empty(cols, np.float32)
+    _place_columns(step, place, way)
     near = dim.size > 0
     reaching, turning = np.ones(cols, np.float32), np.ones(cols, np.float32)
     for row in range(first, last):
         if d.size:
-            _fill_between(d[0], row, step, beyond)
-            _fill_between(d[1], row, step, usual)
+            _fill_between(d[0], row, step, ends, place, way, beyond)
+            _fill_between(d[1], row, step, ends, place, way, usual)
         if near:
-            _fill_between(dim, row, step, reaching)
-            _fill_between(wider, row, step, turning)
+            _fill_between(dim, row, step, ends, place, way, reaching)
+            _fill_between(wider, row, step, ends, place, way, turning)
         sizes[:], means[:] = ZERO, TINY
         for channel in range(channels):
             for col in range(cols):
@@ -86,8 +90,10 @@ def add_rows(error: Samples, more: Floats, step: int, first: int, last: int) -> 
     out, d = lent(error), lent(more)
     cols = out.shape[1]
     line = np.zeros(cols, np.float32)
+    ends, place, way = np.empty((2, cols), np.float32), np.empty(cols, np.uint32), np.empty(cols, np.float32)
+    _place_columns(step, place, way)
     for row in range(first, last):
-        _fill_between(d, row, step, line)
+        _fill_between(d, row, step, ends, place, way, line)
         for col in range(cols):
             one = decoded(out[row, col])
             degrees = min(np.sqrt(one * one + line[col] * line[col]), LARGEST_DEG)
@@ -95,16 +101,29 @@ def add_rows(error: Samples, more: Floats, step: int, first: int, last: int) -> 
 
 
 @FUSED.inlined
-def _fill_between(coarse: Floats, row: int, step: int, line: Floats) -> None:
-    """Fill a row from a plane of every ``step``-th row and column."""
+def _fill_between(coarse: Floats, row: int, step: int, ends: Floats, place: Places, way: Floats, line: Floats) -> None:
+    """Fill a row from a plane of every ``step``-th row and column; ``ends`` (2, col) is room for what lies at these and
+    what it rises by to the next; ``place`` and ``way`` are those of ``_place_columns``."""
     y, one = row // step, ONE / np.float32(step)
     down, below = np.float32(row - y * step) * one, min(y + 1, coarse.shape[0] - 1)
-    for x in range(coarse.shape[1]):
-        beside = min(x + 1, coarse.shape[1] - 1)
-        left = coarse[y, x] + down * (coarse[below, x] - coarse[y, x])
-        rise = coarse[y, beside] + down * (coarse[below, beside] - coarse[y, beside]) - left
-        for k in range(min(step, len(line) - x * step)):
-            line[x * step + k] = left + np.float32(k) * one * rise
+    above, under, begins, rises = coarse[y], coarse[below], ends[0], ends[1]
+    for x in range(above.shape[0]):
+        begins[x] = above[x] + down * (under[x] - above[x])
+    last = above.shape[0] - 1
+    for x in range(last):
+        rises[x] = begins[x + 1] - begins[x]
+    rises[last] = ZERO
+    for col in range(line.shape[0]):
+        line[col] = begins[place[col]] + way[col] * rises[place[col]]
+
+
+@FUSED.inlined
+def _place_columns(step: int, place: Places, way: Floats) -> None:
+    """Fill for every column before which one of every ``step``-th it lies, and how far it is on its way to the next."""
+    one = ONE / np.float32(step)
+    for col in range(place.shape[0]):
+        place[col] = col // step
+        way[col] = np.float32(col % step) * one
 
 
 @FUSED.kept
