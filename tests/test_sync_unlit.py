@@ -7,6 +7,7 @@ import pytest
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
@@ -61,6 +62,9 @@ def test_frames_without_the_strobe_are_left_out_and_said(dark: slice, plan: Plan
     period_s = plan.camera.frame_period_s
     lit_s = np.delete(np.arange(FRAMES), dark) * period_s
     assert len(whole) > 0.8 * len(lit_s) * period_s / (plan.cycle_s / len(plan.cycle_slots))
+    start_s, duration_s = (np.array([getattr(one, name) for one in whole]) for name in ("start_s", "duration_s"))
+    first, last = frames_touched(plan.camera, start_s, duration_s)
+    assert not ((first < dark.stop) & (last >= dark.start)).any()
 
 
 @pytest.mark.parametrize("late", [9, 12])
