@@ -19,7 +19,7 @@ Kind = TypeVar("Kind", bound=np.generic)
 LARGE_PIXELS = 1 << 25
 """Pictures of more pixels have planes in files: just more than 8K video has, whose results come and go in memory."""
 WORKED_ON_PIXELS = 1 << 20
-"""From this many pixels on, what is worked on in steps lies in files while a step needs it not."""
+"""From this many pixels on, what is worked on in steps lies in files while no step needs it."""
 BAND_ROWS = 64
 """Of what is worked on row by row, this many are in memory at a time."""
 APART_BYTES = 1 << 20

@@ -20,9 +20,9 @@ from psvideo.sync.verdict.believed import believed_fit, doubtful
 from psvideo.sync.verdict.refusal import nothing_to_find
 
 RECUTS = 2
-"""How often parts are cut again;"""
+"""How often parts are cut again."""
 BESIDE = 2
-"""they are where the strobe of one foretells this many frames of the next."""
+"""Parts are cut again where the strobe of one foretells this many frames of the next."""
 MOST_TIMED = 0.5
 """A clip in parts is timed where this share of its frames lies in parts in which the strobe is found,"""
 MIXED = 6

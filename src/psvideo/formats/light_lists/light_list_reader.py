@@ -157,8 +157,8 @@ def _names(path: Path, count: int, plan_lights: Sequence[str]) -> list[str]:
 
 
 def _written_names(path: Path, count: int) -> list[str]:
-    """Return what a list calls its lights, or their pictures without folders and endings; empty where it does not call
-    every light otherwise."""
+    """Return what a list calls its lights, or their pictures without folders and endings; empty where that
+    names none, or two lights alike."""
     words = [re.split(r"[\\/]", name)[-1] for name in pictures_named_by(path)]
     try:
         names = [check_light_name(ENDING.sub("", word) or word) for word in words]

@@ -24,9 +24,9 @@ from psvideo.model.timing import Flash, Timing
 Flags = NDArray[np.bool_]
 
 WHOLE = 1.0 - 1e-9
-"""A row that saw this share of a square flash saw all of it; ..."""
+"""A row that saw this share of a square flash saw all of it."""
 WHOLE_BUT_TAIL = 1.0 - 1e-3
-"""... with tails, which never quite end, one that saw this much did."""
+"""A row that saw this share of a flash with tails, which never quite end, saw all of it."""
 LEAST_SHARE = 0.05
 """A row that saw less of a flash than this is unseen: dividing by so little would bring up only noise."""
 NO_FOREIGN = 1e-5

@@ -20,7 +20,8 @@ WINDOW_PX = 5
 MOST_CHANGE = 2.0
 """A neighbourhood changed where its mean squared difference is this many times what noise makes of it."""
 MOST_DRIFT = 0.4
-"""... or its mean difference, squared, is this share of that; white noise leaves a 25th."""
+"""A neighbourhood changed, too, where its mean difference, squared, is this share of that; white noise leaves a
+25th."""
 FINEST = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
 LEVELS = 8
 LOW_SHARE, LOW_OF_MEAN = 0.25, 1.213 / 3

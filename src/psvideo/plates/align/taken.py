@@ -30,7 +30,7 @@ second. It turns, and its shading with it; detail and shading that both change a
 DARK = 0.003
 """Light that is no shadow's edge, as a share of a sketch's white: noise makes as much."""
 SHADED = 0.25
-"""... nor do those of which one is darker, as a whole, than this share of the other: a shadow passed."""
+"""Parts of which one is darker, as a whole, than this share of the other do not turn: a shadow passed."""
 TURNED = 40.0
 """What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
 BLENDED, BLENDED_UNLIKE, BLENDED_ALIKE = np.float32(0.25), np.float32(0.8), np.float32(0.5)

@@ -37,8 +37,8 @@ MOSAIC = 2
 MOST_NOISE = 2.0
 """A row is known where the ambient picture's noise variance is at most this many times a frame's."""
 MOST_KEPT = 0.01
-"""... and where it holds no more than this of any flash: in few frames a row may see whole flashes only, from which
-nothing separates the ambient light."""
+"""A row is known only where it holds no more than this of any flash: in few frames a row may see whole flashes only,
+from which nothing separates the ambient light."""
 MOVED = 4.0
 """A block moved whose residuals are this many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3

@@ -25,7 +25,7 @@ WINDOW_PX = 5
 NEIGHBOURHOODS = (1 / 24, 1 / 8, 1 / 3, 2.0)
 """Widths, in shares of the picture's longer side, in which the flashes are asked to agree, the smallest first."""
 LEAST_PX = 11
-"""... and no narrower than that, where pictures are small."""
+"""No neighbourhood is narrower than this, where pictures are small."""
 NARROW = 1 / 8
 """Neighbourhoods in which many colours have become one by chance are wider than this."""
 AROUND = 1 / 4

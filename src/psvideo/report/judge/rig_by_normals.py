@@ -23,9 +23,9 @@ LEANS_DEG, BY_LEANING = 6.0, 0.1
 """Normals would be one surface's if all were changed by more than the first; that says something of the rig where it
 leaves less over by the second, a share of what it leaves."""
 MORE_THAN_SHOWN, SURELY_MORE = 2.0, 4.0
-"""... and where it is more than this many times what residuals show: where lights are each wrong in a way of
-their own, which accuracy says, normals lean by up to 3.5 times that. (Under a rig that is turned as a whole: 25
-times on virtual subjects, 2 to 4 times on photographs.)"""
+"""A lean says something of the rig where it is more than this many times what residuals show: where lights are each
+wrong in a way of their own, which accuracy says, normals lean by up to 3.5 times that. (Under a rig that is turned as a
+whole: 25 times on virtual subjects, 2 to 4 times on photographs.)"""
 SURELY_LEANING = 0.5
 """Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
 REST, EXACT_LIGHTS = 1 / 3, 3

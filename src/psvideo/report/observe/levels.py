@@ -13,9 +13,9 @@ BINS = STOPS * PER_STOP
 _BASE = (127 - STOPS) * PER_STOP
 _EDGES = np.concatenate([2.0 ** (octave - STOPS) * (1 + np.arange(PER_STOP) / PER_STOP) for octave in range(STOPS)])
 TARGET_QUANTILE = 0.995
-"""This share of the subject should be below saturation ..."""
+"""This share of the subject should be below HEADROOM of saturation."""
 HEADROOM = 0.9
-"""... by a tenth."""
+"""The share of saturation below which TARGET_QUANTILE of the subject should be."""
 LEAST_POWER = 0.1
 
 Counts = NDArray[np.int64]

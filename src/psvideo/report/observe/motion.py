@@ -24,7 +24,7 @@ FASTEST = 0.95
 """The speed reported is that of the fastest twentieth of what moves."""
 RETURN_PX = 0.7
 EXPLAINED, DETAIL_PX, SHADING_CODES = 0.7, 9, 12.0
-"""... and what changed is explained where plates differ along the flow by less than this share of what they do at rest,
+"""What changed is explained where plates differ along the flow by less than this share of what they do at rest,
 over this many pixels: flow that fits by chance leads there and back as well. Less than the last may be shading that
 turns."""
 FOLLOWED = 0.3

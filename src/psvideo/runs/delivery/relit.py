@@ -27,9 +27,9 @@ from psvideo.pictures.relit_kernel import Halves, relit
 from psvideo.plates.sequence import Round
 
 TURN_S = 4.0
-"""The light goes round once in this many seconds of playing,"""
+"""The light goes round once in this many seconds of playing."""
 TILT = 0.6
-"""so far from the camera's axis (sine of the angle)."""
+"""How far the light goes round from the camera's axis: the sine of the angle."""
 WIDTH_PX = 1280
 """Pictures of movies are at most this wide."""
 KEPT = "preview/.relit"

@@ -31,14 +31,15 @@ SUBJECT = 1 / 6
 CLEARLY = 0.85
 """Another assumption is named where it leaves less than this share of what is left over."""
 EXPLAINED = 0.12
-"""... and no more than this: what neither explains shines, as metal does, and says nothing of a curve. (Right curves
-leave 6 to 9 % on photographs of plaster and stone; a coin's 43 % become 15 % under a wrong one.)"""
+"""Another assumption is named only where it leaves no more than this: what neither explains shines, as metal does, and
+says nothing of a curve. (Right curves leave 6 to 9 % on photographs of plaster and stone; a coin's 43 % become 15 %
+under a wrong one.)"""
 MOST_BENT = 0.25
 """A wrong curve leaves no more than this over. (Metal leaves 25 to 45 %, and a wrong curve explains it better.)"""
 IN_CODES = 0.98
-"""... and of the pictures' codes less than this share: where a surface bends little, every curve explains it, and in
-light that is a straight line of codes their noise is less. (Linear pictures that were read as sRGB: 0.29 to 0.96; sRGB
-as it is: 1.00 and more.)"""
+"""Another assumption is named only where, in the pictures' codes, it leaves less than this share of
+what is left: where a surface bends little, every curve explains it, and in light that is a straight line of codes their
+noise is less. (Linear pictures that were read as sRGB: 0.29 to 0.96; sRGB as it is: 1.00 and more.)"""
 OTHER_EXPOSURE = 1.05
 ALIKE, NEARLY_ALL, LEAST_AMBIENT = 0.02, 0.99, 0.05
 """A picture of the room's light is brighter than no other by more than noise of 8 bits, at nearly all of its pixels,

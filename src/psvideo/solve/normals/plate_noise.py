@@ -16,8 +16,8 @@ Values = NDArray[np.float64]
 LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""
 WELL_LIT = 0.25
-"""... of a picture whose brightest parts reach this. A darker one is as much less noisy at least: twelve bits that lie
-low in files of sixteen never come near what their files can hold, and are as good as elsewhere."""
+"""LEAST is that of a picture whose brightest parts reach this. A darker one is as much less noisy at least: twelve bits
+that lie low in files of sixteen never come near what their files can hold, and are as good as elsewhere."""
 ROWS, SAMPLES = 24, 1 << 16
 """Noise is looked for in about this many rows of every plate, evenly spread, and this many samples of all: of small
 pictures in more rows."""

@@ -8,7 +8,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, equations
 
 DAMPING = 1e-10
-"""Of every unknown's own precision, what is added where rows tell two unknowns together and neither alone."""
+"""This share of every unknown's own precision is added: rows may show two unknowns together, and neither alone."""
 
 
 def projected(

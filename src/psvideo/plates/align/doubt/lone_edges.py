@@ -31,10 +31,10 @@ LEAST_LIT = 0.04
 FEWEST = 3
 """This many lights must show something of a pixel."""
 AROUND_SHARE = 1 / 8
-"""Edges speak for what lies within such a share of the picture's longer side ..."""
+"""Edges speak for what lies within such a share of the picture's longer side."""
 USUAL, UNSURE = 0.01, 5.0
-"""... where their mean step over all its pixels exceeds the first (subjects that are followed correctly, painted or
-bare: 0.009 on average); what is beyond it, times the second, is the share by which light may be off."""
+"""Edges speak where their mean step over all pixels around exceeds the first (subjects that are followed correctly,
+painted or bare: 0.009 on average); what is beyond it, times the second, is the share by which light may be off."""
 
 FOLLOWED = 0.3
 """Where all lights agree with a motion, this share of that counts: what is followed has its edges slightly off."""

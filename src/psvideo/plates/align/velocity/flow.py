@@ -35,14 +35,14 @@ REFINED, DESCENTS = 1, 12
 BLOCK_PX, AROUND = 4, 4
 """Change is measured on means of blocks this wide, over this many blocks together."""
 LEAST_CHANGE = 1.5
-"""Blocks that change by fewer codes did not move ..."""
+"""Blocks that change by fewer codes did not move."""
 NOISE_FACTOR = 5.0
-"""... nor those that change by less than this many times what independent noise of their pixels explains ..."""
+"""Blocks that change by less than this many times what independent noise of their pixels explains did not move."""
 CODED_BLOCKS = 2
 """Compression works on squares of 8 pixels and more, which is this many blocks."""
 BLOCK_NOISE_FACTOR, MOST_BLOCK_NOISE = 3.0, 2.0
-"""... or by less than the first times the noise that blocks themselves show (compression makes noise that a whole block
-shares), of which at most the second, in codes, counts: more is motion that fills the picture."""
+"""Blocks that change by less than the first times the noise that blocks themselves show did not move: compression makes
+noise that a whole block shares. At most the second, in codes, counts: more is motion that fills the picture."""
 SOME, LEAST_LIT = 8, 8
 """Noise is estimated from every eighth row, where codes are at least this: below, noise is cut off at zero."""
 QUARTER_OF_NORMAL = 0.3186

@@ -23,7 +23,8 @@ EXPLAINED, MARGIN, GAIN = 0.65, 0.05, 0.25
 """A velocity is accepted where what it leaves unexplained is below the first (a share of what rest leaves) less the
 second, or below what rest leaves by the third; the second and third count once for every light."""
 FINE_EXPLAINED = 0.7
-"""... and, over the smaller window, below this share: otherwise outlines carry along what lies beside them."""
+"""Over the smaller window it must leave less than this share, too: otherwise outlines carry along what is beside
+them."""
 GROWN, GROWN_PX = 2, 27
 """This often, pixels beside moving parts join them where both motion and rest explain them, within this window."""
 UNEXPLAINED, MOST = 0.3, 0.1

@@ -22,8 +22,8 @@ MOST_UNSURE = 0.05
 """What a light's plate may be off by for motion, as a share of what shines straight on the surface, where a point still
 speaks for the subject: what was not followed leaves residuals that pass for sheen and roughness."""
 AROUND_SHARE = 1 / 16
-"""... nor on average over such a share of the picture's longer side: where most of what is around was not followed,
-what fits does so by chance."""
+"""Nor may plates be off by more on average over such a share of the picture's longer side: where most of what is around
+was not followed, what fits does so by chance."""
 
 
 def reflectance_of(looks: Sequence[SubjectPoints]) -> Reflectance | None:
