@@ -23,7 +23,7 @@ standard error, in colour only on a terminal and not where `NO_COLOR` is set.
 | exit status | meaning |
 |---|---|
 | 0 | done |
-| 1 | a fault of the footage or the run, or something that does not fit or is missing (`info`, `doctor`) |
+| 1 | a fault of the footage or the run, a run that was stopped, or something that does not fit, is missing or is bad (`info`, `doctor`, `check`) |
 | 2 | wrong usage |
 
 **Completion.** `psvideo --install-completion` adds it to the shell you are in (bash, zsh, fish). Where the shell is not
@@ -64,7 +64,8 @@ def _section(path: str, command: Any) -> str:
     context = command.make_context(path, [], resilient_parsing=True)
     arguments = [one for one in command.params if one.param_type_name == "argument"]
     options = [one for one in command.get_params(context) if one.param_type_name == "option" and one.name != "help"]
-    usage = " ".join(["psvideo", path, *(_metavar(one) for one in arguments)])
+    needed = (_names(one, context).split(", ")[0].strip("`") for one in options if one.required)
+    usage = " ".join(["psvideo", path, *(_metavar(one) for one in arguments), *needed])
     lines = [f"### {path}\n", f"{' '.join((command.help or '').split())}\n", f"```\n{usage}\n```\n"]
     if arguments or options:
         lines += ["| | what | default |", "|---|---|---|"]
@@ -82,7 +83,8 @@ def _metavar(argument: Any) -> str:
 
 def _names(option: Any, context: Any) -> str:
     kind = "" if option.is_flag else " " + option.display_type(context).strip("<>").replace("|", "\\|")
-    return ", ".join(f"`{name}{kind if name.startswith('--') else ''}`" for name in reversed(option.opts))
+    named = ", ".join(f"`{name}{kind if name.startswith('--') else ''}`" for name in reversed(option.opts))
+    return " / ".join([named, *(f"`{name}`" for name in option.secondary_opts)])
 
 
 def _default(option: Any) -> str:

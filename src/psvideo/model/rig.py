@@ -23,6 +23,8 @@ def vector(values: Sequence[float] | FloatArray) -> Vector:
 
 UNIT_TOLERANCE = 0.01
 """A unit vector's length may be off by this much: two digits a number, as people write them."""
+ROUNDED = 1e-9
+"""Vectors whose length is off by more are made unit ones."""
 
 
 def three_numbers(name: str, given: object, expected: str) -> FloatArray:
@@ -87,6 +89,8 @@ class Light:
                     f"`{name}` of light {self.name!r} has length {length:.4g}; expected a unit vector. Divide it by "
                     "its length; how strong a light is belongs into `intensity`."
                 )
+            if name != "position_m" and abs(length - 1) > ROUNDED:
+                object.__setattr__(self, name, tuple((vector / length).tolist()))
         if self.colour is not None:
             three_numbers("colour", self.colour, "what red, green and blue see of the light: three numbers from 0 on")
         if (self.direction is None) == (self.position_m is None):

@@ -133,11 +133,11 @@ def _on_plane(ratio: NDArray[np.float64], reached: NDArray[np.bool_], jumps: NDA
 
 def _wide(points: NDArray[Any], step: int, shape: tuple[int, int]) -> NDArray[Any]:
     """Return a plane of points for all pixels: a point stands for the ``step`` by ``step`` pixels around it."""
-    size = (points.shape[1] * step, points.shape[0] * step)
-    wide = cv2.resize(points, size, interpolation=cv2.INTER_NEAREST)
-    half = step // 2
-    padded = np.pad(wide, ((half, 0), (half, 0)), mode="edge")
-    return np.ascontiguousarray(padded[: shape[0], : shape[1]])
+    rows, cols = (
+        np.minimum((np.arange(pixels) + step // 2) // step, count - 1)
+        for pixels, count in zip(shape, points.shape, strict=True)
+    )
+    return np.ascontiguousarray(points[rows[:, None], cols])
 
 
 def _costs(

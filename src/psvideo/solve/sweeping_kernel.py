@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.irradiance.near_light import LEAST_COSINE
 
 ROUNDS = 4
 """Of weighing down what does not fit."""
@@ -36,7 +37,7 @@ def sweep_points(
             continue
         off = np.sqrt(noise * noise + own * own * most * most)
         for n in range(len(ratios)):
-            depth = plane_m[point] * ratios[n]
+            depth, mean = plane_m[point] * ratios[n], 0.0
             for k in range(lights):
                 x, y, z, sent = positions[k, 0], positions[k, 1], positions[k, 2], lamps[k, 0]
                 if lamps[k, 2] > 0:
@@ -45,9 +46,11 @@ def sweep_points(
                     x, y, z = x / away, y / away, z / away
                     sent /= away * away
                     if lamps[k, 1] > 0:
-                        sent *= max(-(x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]), 0.01) ** lamps[k, 1]
+                        sent *= max(-(x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]), LEAST_COSINE) ** lamps[k, 1]
                 vectors[k, 0], vectors[k, 1], vectors[k, 2] = x * sent, y * sent, z * sent
+                mean += sent / lights
                 weight[k] = 1.0 if light[point, k] > 6 * noise else 0.0
+            vectors /= mean  # what lamps send is in any unit, and TINY in none
             total = 0.0
             for _ in range(ROUNDS):
                 _left_over(light[point], vectors, weight, left)

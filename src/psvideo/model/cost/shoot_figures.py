@@ -7,6 +7,7 @@ for flashes of different length eq. 15; the dark row's move is eq. 13.
 import math
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 
 from psvideo.model.plan import Plan, PlannedFlash
 
@@ -100,6 +101,15 @@ def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigure
         slots=slots,
         lights=tuple(_light_figures(plan, name, times) for name in plan.lights),
     )
+
+
+def mixed_share(plan: Plan, *, exposure_s: float, dark_s: float) -> float:
+    """Return the share of rows that see light of two flashes, for the exposure and dark time that were found: 0 where
+    the dark time is as long as the exposure. Dark slots lie between flashes that no exposure sees together."""
+    slots = [plan.flashes[slot].is_dark for slot in plan.cycle_slots]
+    pairs = sum(not (one or other) for one, other in pairwise([*slots, slots[0]]))
+    longer_s = plan.dark_s * len(slots) - dark_s * len(slots)
+    return min(max(exposure_s - dark_s, 0.0) * pairs / max(plan.cycle_s - longer_s, 1e-12), 1.0)
 
 
 def cycle_length_s(plan: Plan) -> float:

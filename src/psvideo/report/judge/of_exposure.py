@@ -60,10 +60,14 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
         yield Judgement(
             subject="exposure",
             grade="good",
-            found=f"The brightest parts are {-top:.1f} stops below {under}, and at most {100 * worst:.1f} % of "
-            "the subject is clipped.",
+            found=f"The brightest parts {_reach(top, under)}, and at most {100 * worst:.1f} % of the subject is clipped.",
         )
     yield from clipped
+
+
+def _reach(top_stops: float, under: str) -> str:
+    """Say how near to what is above them the brightest parts come."""
+    return f"reach {under}" if top_stops > -0.05 else f"are {-top_stops:.1f} stops below {under}"
 
 
 def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:

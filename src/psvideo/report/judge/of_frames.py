@@ -30,7 +30,7 @@ class FrameLight:
 
 def frame_light(image: NDArray[np.float32]) -> FrameLight:
     """Return how bright a frame is; ``image`` is linear light, (row, col[, channel])."""
-    thin = image[::STEP, ::STEP]
+    thin = np.nan_to_num(image[::STEP, ::STEP], nan=0.0)
     return FrameLight(top=float(np.quantile(thin, 0.999)), clipped=float((thin >= SATURATED).mean()))
 
 

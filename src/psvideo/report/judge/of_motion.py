@@ -45,7 +45,12 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
     if plan.mode == "synced":
         blur_px = step_px
     if step_px <= FAST_PX:
-        still = "Nothing moves." if step_px < 0.01 else f"At most {step_px:.2f} px of motion from flash to flash."
+        most_px = max(speeds) * flash_s
+        still = "Nothing moves." if most_px < 0.01 else f"At most {most_px:.2f} px of motion from flash to flash."
+        if most_px > FAST_PX:
+            still = (
+                f"In nine of ten rounds at most {step_px:.2f} px of motion from flash to flash; {most_px:.1f} px once."
+            )
         return Judgement(subject="motion", grade="good", found=still)
     grave = step_px > LOST_PX and share > FEW_MOVE and not aligned
     return Judgement(

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
+from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import counted, listed
@@ -33,8 +34,9 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
     if take_s is not None and without_dark:
         unseen = 0.0  # more frames tell the ambient light of more rows
     said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
-    said += _dropped(timing, observed)
-    if unseen > MOST_UNSEEN and not said and without_dark:
+    holes = list(_dropped(timing, observed))
+    explained = bool(said) or (bool(timing.dropped_frames) and unseen <= LOST_UNSEEN)
+    if unseen > MOST_UNSEEN and not explained and without_dark:
         said.append(
             Judgement(
                 subject="rows",
@@ -44,7 +46,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
                 advice="Film longer, or add a dark slot to the plan.",
             )
         )
-    elif unseen > MOST_UNSEEN and not said:
+    elif unseen > MOST_UNSEEN and not explained:
         said.append(
             Judgement(
                 subject="rows",
@@ -54,19 +56,23 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
             )
         )
     yield from said
-    if not said:
-        yield Judgement(subject="rows", grade="good", found="Every row of every round was seen; no frame is missing.")
+    yield from holes
+    if not said and not holes:
+        seen = (
+            "Every row of every round was seen" if not unseen else f"All but {100 * unseen:.1g} % of the rows were seen"
+        )
+        yield Judgement(subject="rows", grade="good", found=f"{seen}; no frame is missing.")
 
 
 def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
     dark_s = plan.dark_s * (1 + timing.clock_offset_ppm * 1e-6)
-    share = (timing.exposure_s - dark_s) / timing.frame_period_s
+    share = mixed_share(plan, exposure_s=timing.exposure_s, dark_s=dark_s)
     if share > MIXED:
         yield Judgement(
             subject="rows",
             grade="bad" if share > LOST_MIXED else "doubtful",
             found=f"The dark time of {dark_s * 1e3:.4g} ms is shorter than the exposure of "
-            f"{timing.exposure_s * 1e3:.4g} ms: about {100 * min(share, 1):.0f} % of the rows hold two flashes, and "
+            f"{timing.exposure_s * 1e3:.4g} ms: about {100 * share:.0f} % of the rows hold two flashes, and "
             "plates are cut there.",
             advice=f"Lengthen the dark time to at least {timing.exposure_s * 1e3:.4g} ms: make the plan again with "
             "psvideo capture-plan.",

@@ -26,7 +26,9 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
         yield Judgement(
             subject="timing",
             grade="bad" if rows > LOST_ROWS else "doubtful",
-            found=f"Flash times are known to {rows:.2f} row only: plates may be torn near the dark row.",
+            found=f"Flash times are known to {rows:.2f} row only: plates may be torn near the dark row."
+            if timing.row_time_s
+            else f"{timing.how_sure} Frames that hold two flashes may be taken for one.",
             advice="Check that plan.toml is what the strobe played, and its transfer how the files code light: a wrong "
             "curve looks like another exposure. Fix the exposure, and switch stabilisation off.",
         )

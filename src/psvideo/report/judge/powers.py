@@ -14,7 +14,8 @@ FAINTEST = 1 / 32
 
 def power_words(plan: Plan, observed: Observed) -> dict[str, str]:
     """Return for every light that was seen what to set its power to, as a sentence."""
-    levels = {light: observed.levels(light) for light in plan.lights if light in observed.counts}
+    found = {light: observed.levels(light) for light in plan.lights if light in observed.counts}
+    levels = {light: one for light, one in found.items() if one.total}
     whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
     return {light: _words(max(plan.powers(light)), one, whole) for light, one in levels.items()}
 

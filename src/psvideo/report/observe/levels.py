@@ -46,7 +46,10 @@ class Levels:
         return float(self.counts[-1] / max(self.total, 1))
 
     def quantile(self, share: float) -> float:
-        """Return the light, 1.0 = saturation, below which a share of the samples lies; 1.0 where it is clipped."""
+        """Return the light, 1.0 = saturation, below which a share of the samples lies; 1.0 where it is clipped, and 0
+        where nothing was counted."""
+        if not self.total:
+            return 0.0
         upto = np.concatenate([[0], np.cumsum(self.counts[:-1])]) / max(self.total, 1)
         if share >= upto[-1]:
             return 1.0

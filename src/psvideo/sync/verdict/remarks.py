@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.units import show_seconds
 from psvideo.sync.rowfit.beat import Beat
@@ -85,13 +86,12 @@ def _unsteady(found: ClipFit) -> str:
 
 
 def _mixed(plan: Plan, beat: Beat) -> str:
-    short_s = beat.exposure_s - plan.dark_s * beat.clock.rate
-    span_s = plan.camera.frame_period_s
-    if short_s < MIXED_ROWS * span_s:
+    share = mixed_share(plan, exposure_s=beat.exposure_s, dark_s=plan.dark_s * beat.clock.rate)
+    if share < MIXED_ROWS:
         return ""
     return (
         f"The dark time of {plan.dark_s * 1e3:.4g} ms is shorter than the exposure of {beat.exposure_s * 1e3:.4g} ms: "
-        f"about {100 * min(short_s / span_s, 1):.0f} % of the rows of every frame hold two flashes, which cannot be "
+        f"about {100 * share:.0f} % of the rows of every frame hold two flashes, which cannot be "
         "separated. Lengthen the dark time or shorten the exposure."
     )
 

@@ -19,6 +19,10 @@ TAIL_LOST = 1e-3
 """A flash with a tail is complete when no row lost more of its light; the last of a tail never ends."""
 
 
+NEWTON_STEPS = 4
+"""Clocks are nearly straight: each step squares what is left of a thousandth."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class TrueClock:
     """The strobe's clock against the camera's.
@@ -38,6 +42,13 @@ class TrueClock:
         """Return strobe seconds since the cycle's begin as times on the camera's clock, without jitter."""
         drift = 0.5e-6 * self.drift_ppm_per_s * strobe_s**2
         return self.phase_s + strobe_s * (1.0 + self.offset_ppm * 1e-6) + drift
+
+    def strobe_time_s(self, camera_s: FloatArray) -> FloatArray:
+        """Return times on the camera's clock as strobe seconds since the cycle's begin: ``camera_time_s`` reversed."""
+        strobe_s = np.asarray(camera_s - self.phase_s, np.float64)
+        for _ in range(NEWTON_STEPS):
+            strobe_s = strobe_s - (self.camera_time_s(strobe_s) - camera_s) / self.rate(strobe_s)
+        return strobe_s
 
     def rate(self, strobe_s: FloatArray) -> FloatArray:
         """Return how many camera seconds a strobe second lasts at the given strobe times."""
@@ -112,8 +123,8 @@ def true_flashes(
 def _free(plan: Plan, clock: TrueClock, end_s: float) -> tuple[FlashTrain, FloatArray, FloatArray]:
     """Let the strobe run freely from well before the clip to well after it."""
     per_cycle = len(plan.cycle_slots)
-    first = int(np.floor(-clock.phase_s / plan.cycle_s)) - 1
-    last = int(np.ceil((end_s - clock.phase_s) / plan.cycle_s)) + 1
+    ends_s = clock.strobe_time_s(np.array([0.0, end_s]))
+    first, last = int(np.floor(ends_s[0] / plan.cycle_s)) - 1, int(np.ceil(ends_s[1] / plan.cycle_s)) + 1
     train = plan.train(first * per_cycle, (last - first) * per_cycle)
     late_s = clock.jitter_s * np.random.default_rng([clock.seed, 1]).standard_normal(len(train.start_s))
     return train, clock.camera_time_s(train.start_s) + late_s, train.duration_s * clock.rate(train.start_s)
