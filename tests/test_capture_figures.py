@@ -1,5 +1,6 @@
 """The figures of a shoot: the paper's equations fall out of them, and counting by hand agrees."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from psvideo.model.camera import Camera
-from psvideo.model.cost.shoot_figures import dark_row_move_px, frames_per_flash, row_shares, shoot_figures
+from psvideo.model.cost.shoot_figures import dark_row_move_px, frames_per_flash, mixed_share, row_shares, shoot_figures
 from psvideo.model.plan import Mode, Plan, PlannedFlash
 
 
@@ -171,6 +172,22 @@ def test_a_row_receives_no_more_than_its_exposure_holds() -> None:
     plan = Plan(camera=camera, flashes=paper_plan(20e-3).flashes, dark_s=0.0, mode="synced")
     slot = shoot_figures(plan).slots[0]
     assert (slot.light_share, slot.stops) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(("exposure_s", "dark_s"), [(0.010, 0.005), (0.010, 0.009), (0.008, 0.001), (0.010, 0.010)])
+def test_rows_that_hold_two_flashes_are_counted_as_their_shutter_sees_them(exposure_s: float, dark_s: float) -> None:
+    """Held against flashes laid over exposures that begin anywhere in the cycle."""
+    camera = Camera(width_px=4, height_px=4, fps=Fraction(100), exposure_s=exposure_s, readout_s=0.01)
+    for dark_slot_s in (None, 1e-3):
+        plan = replace(paper_plan(1e-3, 1e-3, 1e-3, dark_slot_s=dark_slot_s), camera=camera, dark_s=dark_s)
+        if dark_slot_s and exposure_s > 2 * dark_s + dark_slot_s:
+            continue  # sees flashes on both sides of the dark slot, too
+        train = plan.train(-20, 60)
+        is_lit = np.array([not plan.flashes[slot].is_dark for slot in train.slot])
+        opens_s = np.linspace(0, plan.cycle_s, 4000, endpoint=False)[:, None]
+        seen = (train.start_s + train.duration_s > opens_s) & (train.start_s < opens_s + exposure_s) & is_lit
+        truth = float((seen.sum(axis=1) > 1).mean())
+        assert mixed_share(plan, exposure_s=exposure_s, dark_s=dark_s) == pytest.approx(truth, abs=0.002)
 
 
 def test_rare_dark_slots_cost_their_share_of_the_rate() -> None:

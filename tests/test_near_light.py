@@ -22,6 +22,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.solve import near_surface
 from psvideo.solve.depth import Shaping, View
+from psvideo.solve.falloff_costs import around, falloff_costs, for_pixels
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.least_squares import woodham1980
@@ -474,3 +475,42 @@ def test_the_compiled_lights_are_those_of_the_model(anisotropy: float) -> None:
         wanted = near_vectors(points, field.positions_m[light], axis=field.axes[light], anisotropy=anisotropy)
         np.testing.assert_allclose(matrix[light].T, wanted, rtol=2e-5)
         np.testing.assert_allclose(1 / per[light], np.linalg.norm(wanted, axis=1), rtol=2e-5)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("size", [(17, 23), (20, 20)])
+def test_a_point_stands_for_the_pixels_that_it_is_the_mean_of(count: int, size: tuple[int, int]) -> None:
+    rows, cols = size
+    light = np.zeros((*size, 1))
+    light[..., 0] = np.arange(rows)[:, None] * 1000 + np.arange(cols)
+    points = np.arange(-(-rows // count) * -(-cols // count)).reshape(-(-rows // count), -(-cols // count))
+    of = for_pixels(points, count, size)
+    assert of.shape == size
+    means = around(light, count)[..., 0]
+    inner = means[:-1, :-1]  # at the far border a point stands for what is beyond its own square, too
+    for (row, col), mean in np.ndenumerate(inner):
+        assert light[of == points[row, col]].mean() == pytest.approx(mean)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_distances_do_not_hang_on_the_unit_of_the_lamps_strengths(scale: float) -> None:
+    """Calibration on a mirror gives every lamp a strength of 1, whatever it sends."""
+    ways = [(2 * np.cos(a), 2 * np.sin(a), 0.3) for a in np.linspace(0, 2 * np.pi, 6, endpoint=False)]
+    plane = (0.0, 0.0, 1.0, 1.5)
+    lights = tuple(Light(name=f"l{n}", position_m=at, intensity=(scale,)) for n, at in enumerate(ways))
+    rig = Rig(lights=lights, focal_px=(60.0, 60.0), principal_px=(15.5, 11.5), plane=plane)
+    ground = ground_of(rig, height_px=24, width_px=32)
+    x, y = (np.arange(32) - 15.5) / 60, (11.5 - np.arange(24)) / 60
+    points = 2.2 * np.stack([*np.meshgrid(x, y), -np.ones((24, 32))], axis=-1)  # a wall 2.2 m away
+    seen = []
+    for at in ways:
+        towards = np.array(at) - points
+        away = np.linalg.norm(towards, axis=-1)
+        seen.append(towards[..., 2] / away**3)
+    light = np.stack(seen, axis=-1)
+    light *= 0.5 / light.max()
+    costs = falloff_costs(ground, lights, light, ground.depth_m.astype(np.float64), RATIOS,
+                          at=np.ones((24, 32), np.bool_), step=1, noise=1e-3)  # fmt: skip
+    best = RATIOS[np.argmin(costs.mean(axis=1))]
+    assert best == pytest.approx(2.2 / 1.5, rel=0.05)
+    assert costs.mean(axis=1).max() > 10 * costs.mean(axis=1).min(), "other distances do not explain it"

@@ -182,4 +182,10 @@ def test_a_direction_is_a_unit_vector_of_finite_numbers(at: Vector) -> None:
         Light(name="key", direction=at)
     with pytest.raises(UsageError, match="`axis`"):
         Light(name="key", position_m=(0.0, 0.0, 1.0), axis=at)
-    assert Light(name="key", direction=(0.0, 0.6, 0.8005)).direction == (0.0, 0.6, 0.8005)
+
+
+def test_a_direction_that_people_rounded_is_made_a_unit_vector() -> None:
+    rounded = Light(name="key", direction=(0.0, 0.6, 0.805)).direction
+    assert rounded is not None
+    assert sum(part**2 for part in rounded) == pytest.approx(1, abs=1e-12)
+    assert Light(name="key", direction=(0.0, 0.6, 0.8)).direction == (0.0, 0.6, 0.8), "to the bit"

@@ -1,6 +1,7 @@
 """The virtual sensor against brute force, closed forms, and another simulator's clips."""
 
 import json
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -277,3 +278,19 @@ def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data
 
 def _exr(path: Path) -> np.ndarray:
     return np.asarray(OpenEXR.File(str(path)).channels()["RGB"].pixels, np.float32)
+
+
+@given(st.floats(-5000, 5000), st.floats(-20, 20), st.floats(-1, 1), st.floats(0, 600))
+def test_a_clock_turns_back_what_it_turned(offset_ppm: float, drift: float, phase_s: float, at_s: float) -> None:
+    clock = TrueClock(phase_s=phase_s, offset_ppm=offset_ppm, drift_ppm_per_s=drift)
+    there = clock.camera_time_s(np.array([at_s]))
+    assert clock.strobe_time_s(there)[0] == pytest.approx(at_s, abs=1e-9)
+
+
+@pytest.mark.parametrize("offset_ppm", [-5000.0, 5000.0])
+def test_a_strobe_flashes_to_the_end_of_a_long_clip(make_plan: Callable[..., Plan], offset_ppm: float) -> None:
+    plan, frames = make_plan(), 1800
+    flashes = true_flashes(plan, TrueClock(offset_ppm=offset_ppm), frames=frames, dropped=frozenset())
+    pitch_s = 2 * plan.cycle_s / len(plan.cycle_slots)
+    assert flashes[-1].start_s > frames * plan.camera.frame_period_s - pitch_s
+    assert flashes[0].start_s < pitch_s

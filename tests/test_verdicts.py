@@ -25,12 +25,15 @@ from psvideo.report.judge import of_motion, of_rows, of_timing, result
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
+from psvideo.report.judge.of_frames import frame_light
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
+from psvideo.report.observe.levels import count_levels
 from psvideo.report.observe.motion import glimpse, motion_between
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
@@ -501,7 +504,7 @@ def timed(**changed: Any) -> str:
 
 
 def covered(subject: str, footage: Footage = GOOD, *, dark_s: float = 0.01, **changed: Any) -> str:
-    """Return what is said of the rows of a rolling plan with this dark time."""
+    """Return what is said of rows under a rolling plan of 5 ms flashes with this dark time, at an exposure of 10 ms."""
     plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
     return graded(list(of_rows.coverage(plan, timing_of(**changed), footage.observed(0))), subject)
 
@@ -516,7 +519,7 @@ def moved(px_per_flash: float, *, aligned: bool = False) -> str:
 
 def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> None:
     assert [timed(phase_error_rows=rows) for rows in (0.28, 0.32, 1.9, 2.1)] == ["good", "doubtful", "doubtful", "bad"]
-    assert [covered("rows", dark_s=dark_s) for dark_s in (0.00985, 0.0097, 0.0082, 0.0078)] == [
+    assert [covered("rows", dark_s=dark_s) for dark_s in (0.00985, 0.0097, 0.0077, 0.0073)] == [
         "good", "doubtful", "doubtful", "bad"
     ]  # fmt: skip
     unseen = [covered("rows", Footage(unseen=share)) for share in (0.01, 0.04, 0.28, 0.33)]
@@ -829,3 +832,50 @@ def test_what_is_clipped_does_not_seem_to_move_where_the_rows_that_two_frames_sh
     found = motion_between(one, glimpse(plate(1), one.white))
     assert found is not None
     assert (found.speed_px_s, found.share) == (0, 0)
+
+
+def test_a_light_that_was_never_seen_does_not_pass_for_a_bright_one() -> None:
+    dim = np.full(1000, 0.005, np.float32)
+    one = Observed(lights=("a", "b"))
+    one.counts["a"], one.counts["b"] = count_levels(dim, 1.0), np.zeros_like(count_levels(dim, 1.0))
+    (line,) = judge_exposure(one)
+    assert (line.grade, "The picture is dark" in line.found) == ("bad", True)
+    assert list(power_words(plan_of(("a", "b")), one)) == ["a"]
+
+
+def facts_of(**what: Any) -> InstantFacts:
+    known = {"number": 1001, "time_s": 0.0, "valid_share": 1.0, "clipped_share": 0.0, "unseen_share": 0.0}
+    return InstantFacts(**{**known, **what})
+
+
+@pytest.mark.parametrize("hole", [(), (DroppedFrames(after=7, count=1),)])
+def test_rows_that_nobody_saw_are_judged_beside_a_missing_frame(hole: tuple[DroppedFrames, ...]) -> None:
+    timing = replace(timing_of(), dropped_frames=hole, repeated_frames=(9,))
+    one = Observed(lights=("a",), facts=KeptFacts([facts_of(unseen_share=0.8)]))
+    lines = list(of_rows.coverage(plan_of(("a",)), timing, one))
+    assert (lines[0].subject, lines[0].grade) == ("rows", "bad")
+    assert {line.subject for line in lines} == {"rows", "frames"}
+
+
+def test_every_row_is_said_to_be_seen_only_where_every_row_was() -> None:
+    found = []
+    for share in (0.0, 0.015):
+        one = Observed(lights=("a",), facts=KeptFacts([facts_of(unseen_share=share)]))
+        (line,) = of_rows.coverage(plan_of(("a",)), timing_of(), one)
+        found.append((line.grade, line.found.split(" seen")[0]))
+    assert found == [("good", "Every row of every round was"), ("good", "All but 1.5 % of the rows were")]
+
+
+def test_motion_in_a_few_rounds_is_said() -> None:
+    speeds = [0.0] * 19 + [900.0]
+    rounds = [facts_of(moving_share=0.1 if speed else 0.0, speed_px_s=speed) for speed in speeds]
+    one = Observed(lights=("a",), facts=KeptFacts(rounds))
+    line = of_motion.motion(plan_of(("a",)), timing_of(), one)
+    assert "Nothing moves" not in line.found
+    assert "In nine of ten rounds" in line.found
+
+
+def test_frames_with_values_that_are_no_numbers_are_judged_by_the_others() -> None:
+    image = np.full((40, 40), 0.5, np.float32)
+    image[0, 0] = np.nan
+    assert frame_light(image).top == pytest.approx(0.5)

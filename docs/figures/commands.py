@@ -23,7 +23,7 @@ standard error, in colour only on a terminal and not where `NO_COLOR` is set.
 | exit status | meaning |
 |---|---|
 | 0 | done |
-| 1 | a fault of the footage or the run, a run that was stopped, or something that does not fit, is missing or is bad (`info`, `doctor`, `check`) |
+| 1 | a fault of footage or run, a stopped run, or what does not fit, is missing or bad (`check`, `info`, `doctor`) |
 | 2 | wrong usage |
 
 **Completion.** `psvideo --install-completion` adds it to the shell you are in (bash, zsh, fish). Where the shell is not

@@ -1,6 +1,7 @@
 """The cost of each assumed distance: how badly it explains what near lights show at points of the picture."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.ground import Ground, every_ray
 from psvideo.model.irradiance.near_light import near_field
 from psvideo.model.rig import Light
+from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.plate_noise import LEAST
 from psvideo.solve.normals.task import Samples
@@ -16,14 +18,13 @@ from psvideo.solve.normals.task import Samples
 Plates = Sequence[Samples] | Sequence[Mixture]
 OWN_SHARE = 0.005
 """What surfaces are off by from the model where nothing is wrong."""
-SATURATED = 0.98
 
 
 def light_at(plates: Plates, step: int, seen: NDArray[np.bool_] | None) -> NDArray[np.float64]:
     """Return every ``step``-th row and column of all plates, their channels' mean, (row, col, light); -1 where it is
     clipped or was not seen. ``seen``: (light, row) or (light, row, col)."""
     light = np.stack([_thin(plate, step) for plate in plates], axis=-1).astype(np.float64)
-    light[light >= SATURATED] = -1
+    light[light >= SATURATED - LOSSY_MARGIN] = -1
     if seen is not None:
         shown = seen[:, ::step, None] if seen.ndim == 2 else seen[:, ::step, ::step]
         light[~np.broadcast_to(np.moveaxis(shown, 0, -1), light.shape)] = -1
@@ -44,6 +45,15 @@ def around(light: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 
     number = sums(known.astype(np.float64))
     return np.where(number * 2 > sums(np.ones_like(light)), sums(np.where(known, light, 0)) / np.maximum(number, 1), -1)
+
+
+def for_pixels(points: NDArray[Any], count: int, shape: tuple[int, int]) -> NDArray[Any]:
+    """Return a plane of points for all pixels of a ``shape``: each stands for those over which ``around`` averages."""
+    rows, cols = (
+        np.minimum((np.arange(pixels) + count // 2) // count, there - 1)
+        for pixels, there in zip(shape, points.shape, strict=True)
+    )
+    return np.ascontiguousarray(points[rows[:, None], cols])
 
 
 def falloff_costs(

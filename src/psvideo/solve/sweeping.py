@@ -9,7 +9,6 @@ the plane stays there.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.irradiance.ground import Ground, spread
 from psvideo.model.rig import Light
-from psvideo.solve.falloff_costs import Plates, around, falloff_costs, light_at
+from psvideo.solve.falloff_costs import Plates, around, falloff_costs, for_pixels, light_at
 from psvideo.solve.near_surface import NearSurface
 from psvideo.solve.normals.plate_noise import noise_of
 from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
@@ -64,12 +63,12 @@ def swept(
         return near
     if found.on_plane:
         return replace(near, ground=replace(near.ground, unsure=found.unsure))
-    closer, farther = (_wide(side, each * fine, (rows, cols))[::fine, ::fine] for side in sides_of(found.depth_m))
+    closer, farther = (for_pixels(side, each * fine, (rows, cols))[::fine, ::fine] for side in sides_of(found.depth_m))
     drawn, torn = outlined(near.ground, lights, light, (closer, farther), step=fine, noise=dark)
     unsure = np.maximum(cv2.resize(found.unsure, torn.shape[::-1], interpolation=cv2.INTER_LINEAR), torn)
     ground = replace(near.ground, unsure=unsure)
-    depth_m = _wide(drawn, fine, (rows, cols))
-    apart = _wide(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
+    depth_m = for_pixels(drawn, fine, (rows, cols))
+    apart = for_pixels(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
     shaping = replace(near.shaping, known_m=depth_m)
     return replace(near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart)
 
@@ -129,15 +128,6 @@ def _on_plane(ratio: NDArray[np.float64], reached: NDArray[np.bool_], jumps: NDA
     count, parts = cv2.connectedComponents((~jumps).astype(np.uint8), connectivity=4)
     known = [ratio[reached & (parts == number)] for number in range(1, count)]
     return all(abs(float(np.log(np.median(part)))) < PLANE_HOLDS for part in known if len(part) >= LEAST_POINTS)
-
-
-def _wide(points: NDArray[Any], step: int, shape: tuple[int, int]) -> NDArray[Any]:
-    """Return a plane of points for all pixels: a point stands for the ``step`` by ``step`` pixels around it."""
-    rows, cols = (
-        np.minimum((np.arange(pixels) + step // 2) // step, count - 1)
-        for pixels, count in zip(shape, points.shape, strict=True)
-    )
-    return np.ascontiguousarray(points[rows[:, None], cols])
 
 
 def _costs(

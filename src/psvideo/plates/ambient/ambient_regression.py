@@ -20,6 +20,7 @@ from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.channels import mean_of_channels
 from psvideo.model.plan import Plan
+from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
 
@@ -43,7 +44,6 @@ MOVED = 4.0
 """A block moved whose residuals are this many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
 """Residuals of less than this, and this share of the block's light, are no motion, however little noise there is."""
-SATURATED = 0.98
 """Small pictures' light from which on a block may hold clipped samples."""
 WINDOW_PX = 5
 """Detail of the ambient picture is judged against its noise over windows of this width (Lee 1980)."""
@@ -176,7 +176,7 @@ def _judged(design: Design, series: Image) -> tuple[Flags, Image]:
     noise = _noise_by_level(variance, level)
     expected = np.maximum(noise, (AT_LEAST + AT_LEAST_SHARE * level) ** 2 / MOVED)
     largest = np.abs(rest).max(axis=0)
-    clipped = series.max(axis=0) > SATURATED
+    clipped = series.max(axis=0) > SATURATED - LOSSY_MARGIN
     stood = (variance < MOVED * expected) & (largest**2 < 16 * MOVED * expected) & ~clipped
     around = cv2.erode(stood.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0  # the rows between are not judged
     return np.asarray(around), noise

@@ -60,7 +60,8 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
         yield Judgement(
             subject="exposure",
             grade="good",
-            found=f"The brightest parts {_reach(top, under)}, and at most {100 * worst:.1f} % of the subject is clipped.",
+            found=f"The brightest parts {_reach(top, under)}, and at most {100 * worst:.1f} % of the subject is "
+            "clipped.",
         )
     yield from clipped
 

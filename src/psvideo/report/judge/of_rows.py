@@ -59,7 +59,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
     yield from holes
     if not said and not holes:
         seen = (
-            "Every row of every round was seen" if not unseen else f"All but {100 * unseen:.1g} % of the rows were seen"
+            "Every row of every round was seen" if not unseen else f"All but {100 * unseen:.2g} % of the rows were seen"
         )
         yield Judgement(subject="rows", grade="good", found=f"{seen}; no frame is missing.")
 
