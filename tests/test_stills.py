@@ -17,6 +17,7 @@ from PIL import ExifTags, Image, ImageCms
 from PIL.PngImagePlugin import PngInfo
 
 import psvideo as ps
+from psvideo.calibrate.still_pairs import pair_stills
 from psvideo.cli.app import main
 from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
@@ -656,3 +657,51 @@ def test_a_profile_that_is_damaged_takes_neither_orientation_nor_exposure_with_i
     Image.new("RGB", (8, 6)).save(tmp_path / "a.jpg", exif=exif, icc_profile=profile)
     said = stated_by(tmp_path / "a.jpg")
     assert (said.turn, said.exposure, said.longer_px, said.transfer) == (EXIF[6], 0.5, 8, None)
+
+
+def named_pictures(folder: Path, names: Sequence[str]) -> Path:
+    folder.mkdir()
+    for level, name in enumerate(names):
+        Image.new("L", (8, 8), 40 + level).save(folder / name)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("listed", "pictures"),
+    [
+        (
+            ("Bu\u0308ste 2.jpg", "Bu\u0308ste 0.jpg", "Bu\u0308ste 1.jpg"),
+            ("B\u00fcste 2.jpg", "B\u00fcste 0.jpg", "B\u00fcste 1.jpg"),
+        ),
+        (("img03.jpg", "img01.jpg", "img02.jpg"), ("img3.jpg", "img1.jpg", "img2.jpg")),
+        (("DSC_103.NEF", "DSC_101.NEF", "DSC_102.NEF"), ("DSC_103_edit.jpg", "DSC_101_edit.jpg", "DSC_102_edit.jpg")),
+        (("a_3_edit.jpg", "a_1_edit.jpg", "a_2_edit.jpg"), ("a_3.jpg", "a_1.jpg", "a_2.jpg")),
+        (("img3.jpg", "img1.jpg", "img2.jpg"), ("IMG3.JPG", "img1.jpg", "img2.jpg")),
+        (("1.jpg", "10.jpg", "100.jpg"), ("001.jpg", "010.jpg", "100.jpg")),
+    ],
+    ids=["accents", "zeros", "a word more", "a word less", "large letters", "all zeros"],
+)
+def test_pictures_are_found_by_names_that_say_the_same(
+    listed: tuple[str, ...], pictures: tuple[str, ...], tmp_path: Path
+) -> None:
+    """By order, as the files are sorted, each would get another one's light."""
+    folder = named_pictures(tmp_path / "photos", pictures)
+    found = pair_stills(folder, listed, named=True, whose="lights.lp")
+    assert [file.name for file in found.files] == list(pictures)
+    assert "by name" in found.how
+
+
+def test_a_list_that_names_other_pictures_and_counts_otherwise_is_refused(tmp_path: Path) -> None:
+    folder = named_pictures(tmp_path / "photos", ("shot1.jpg", "shot2.jpg", "shot3.jpg"))
+    with pytest.raises(PsvideoError, match="numbers do not ascend as the pictures' do"):
+        pair_stills(folder, ("dome_7.jpg", "dome_2.jpg", "dome_9.jpg"), named=True, whose="lights.lp")
+    for names in (("dome_2.jpg", "dome_7.jpg", "dome_9.jpg"), ("key", "left", "top")):
+        found = pair_stills(folder, names, named=True, whose="lights.lp")
+        assert [file.name for file in found.files] == ["shot1.jpg", "shot2.jpg", "shot3.jpg"]
+        assert "by order" in found.how
+
+
+def test_a_name_that_begins_two_pictures_is_asked_about(tmp_path: Path) -> None:
+    folder = named_pictures(tmp_path / "photos", ("a_1.jpg", "a_1_b.jpg", "a_2_b.jpg", "a_3_b.jpg"))
+    found = pair_stills(folder, ("a_1", "a_2_b", "a_3_b"), named=True, whose="lights.lp")
+    assert [file.name for file in found.files] == ["a_1.jpg", "a_2_b.jpg", "a_3_b.jpg"]

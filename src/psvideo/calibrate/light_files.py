@@ -130,7 +130,7 @@ def _main_group(files: list[Path]) -> list[Path]:
 
 
 def _prefix(file: Path) -> str:
-    return re.sub(r"\d+$", "", file.stem)
+    return re.sub(r"\d+$", "", file.stem).casefold()
 
 
 def _in_order(folder: Path, files: list[Path], lights: Sequence[str]) -> dict[str, list[Path]]:

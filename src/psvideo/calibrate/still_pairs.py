@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from psvideo.model.units import listed
 FEWEST = 3
 LISTED = 6
 """This many names are listed in a message."""
+ENDINGS = {*KINDS, ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".dng", ".heic", ".webp", ".bmp"}
+"""What may end a picture's name in a list, also where the picture itself has been exported as another kind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +67,7 @@ def pair_stills(
     _refuse_few(folder, files)
     masks = [file for file in found.left_aside if any(bears(file, name) for name in MASK_NAMES)]
     dark, mask = dark or (found.ambient[0] if found.ambient else None), mask or (masks[0] if masks else None)
-    matches = [_matching(name, files) for name in known] if named else []
+    matches = _matches(known, files) if named else []
     if matches and all(len(one) == 1 for one in matches):
         chosen = [one[0] for one in matches]
         _refuse_named_twice(known, chosen, whose)
@@ -72,6 +75,8 @@ def pair_stills(
     elif any(matches):
         raise PsvideoError(_misnamed(folder, known, matches, files, whose))
     else:
+        if named:
+            _refuse_other_order(folder, known, files, whose)
         chosen = _in_order(folder, files, known, found, whose)
         how = (
             f"Pictures belong to lights by order, since {whose} names none of them: {_shown(known, chosen)}. Where "
@@ -133,14 +138,63 @@ def _refuse_named_twice(known: Sequence[str], chosen: Sequence[Path], whose: str
             )
 
 
-def _matching(name: str, files: Sequence[Path]) -> list[Path]:
-    """Return the files that a name may mean: as a path with or without its ending, or as a light's name."""
+def _matches(names: Sequence[str], files: Sequence[Path]) -> list[list[Path]]:
+    """Return for every name of a list the files that it may mean: in the first way in which each means one, else what
+    their whole names say."""
+    ways = (_by_whole_name, _by_number, _by_beginning)
+    found = [[way(_stem_of(name), files) for name in names] for way in ways]
+    return next((one for one in found if all(len(each) == 1 for each in one)), found[0])
+
+
+def _stem_of(name: str) -> str:
+    """Return a name of a list, a path perhaps, as the stem that its picture should have."""
     word = re.split(r"[\\/]", name.strip())[-1]
-    stem = word.rpartition(".")[0] or word
-    exact = [
-        file for file in files if file.name.lower() == word.lower() or file.stem.lower() in (word.lower(), stem.lower())
-    ]
+    ending = "." + word.rpartition(".")[2].lower()
+    return word[: -len(ending)] if ending in ENDINGS and word[: -len(ending)] else word
+
+
+def _alike(stem: str) -> str:
+    """Return a stem in which letters that look the same are the same: a Mac writes accents as letters of their own."""
+    return unicodedata.normalize("NFC", stem).casefold()
+
+
+def _by_whole_name(stem: str, files: Sequence[Path]) -> list[Path]:
+    """Return the files of a name, or those whose name ends with it, as with a light's."""
+    exact = [file for file in files if _alike(file.stem) == _alike(stem) or _alike(file.name) == _alike(stem)]
     return exact or [file for file in files if bears(file, stem)]
+
+
+def _by_number(stem: str, files: Sequence[Path]) -> list[Path]:
+    """Return the files of a name where zeros before numbers do not count: ``img1`` and ``img01``."""
+    return [file for file in files if _unpadded(file.stem) == _unpadded(stem)]
+
+
+def _unpadded(stem: str) -> str:
+    return re.sub(r"(?<!\d)0+(?=\d)", "", _alike(stem))
+
+
+def _by_beginning(stem: str, files: Sequence[Path]) -> list[Path]:
+    """Return the files whose name goes on after the list's, or ends before it: what was exported gets a word more."""
+    mine = _alike(stem)
+    return [file for file in files if _goes_on(_alike(file.stem), mine) or _goes_on(mine, _alike(file.stem))]
+
+
+def _goes_on(longer: str, shorter: str) -> bool:
+    return longer.startswith(shorter) and not longer[len(shorter) :][:1].isalnum()
+
+
+def _refuse_other_order(folder: Path, names: Sequence[str], files: Sequence[Path], whose: str) -> None:
+    """Raise PsvideoError where a list that names other files counts them in another order than the files': by order
+    every picture would get another one's light."""
+    counted = [re.findall(r"\d+", _stem_of(name)) for name in names]
+    numbers = [int(one[-1]) for one in counted if one]
+    if len(numbers) < len(names) or numbers == sorted(numbers) or not all(re.search(r"\d", one.stem) for one in files):
+        return
+    raise PsvideoError(
+        f"{folder}: {whose} names {listed(names, LISTED)}, and no picture is called so ({files[0].name} to "
+        f"{files[-1].name}). Its numbers do not ascend as the pictures' do, so that their order says nothing. Expected "
+        "the pictures' names: correct them, or sort the lines."
+    )
 
 
 def _in_order(folder: Path, files: Sequence[Path], known: Sequence[str], found: LightFiles, whose: str) -> list[Path]:
