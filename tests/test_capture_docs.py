@@ -24,7 +24,8 @@ def test_the_commands_of_the_page_run_and_draw_its_pictures(command: str, tmp_pa
     app.command()(capture_plan)
     assert CliRunner().invoke(app, inside).exit_code == 0
     for name in pictures:
-        assert (ROOT / name).read_text(encoding="utf-8") == (tmp_path / Path(name).name).read_text(encoding="utf-8")
+        shown = ROOT / "docs" / "pictures" / name
+        assert shown.read_text(encoding="utf-8") == (tmp_path / name).read_text(encoding="utf-8")
 
 
 def test_the_page_shows_pictures_that_are_there() -> None:

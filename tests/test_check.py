@@ -358,3 +358,16 @@ def test_a_page_among_the_footage_is_refused(shot: Callable[[str], Path], capsys
     assert run("check") == 2
     assert run("check", clip, "--watch", clip) == 2
     assert run("check", "--watch", clip / "nowhere") == 2
+
+
+def test_a_rig_that_explains_the_light_of_another_surface_is_no_good_rig(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Three lights explain any plates; mirrored ones give normals of no surface."""
+    rig = (shot("good") / "rig.toml").read_text()
+    mirrored = re.sub(r"direction = \[([-\d.e]+),", lambda m: f"direction = [{-float(m[1])!r},", rig)
+    assert mirrored != rig
+    (tmp_path / "mirrored.toml").write_text(mirrored)
+    assert run("check", shot("good"), "--rig", tmp_path / "mirrored.toml") == 1
+    assert "normals cannot be those of one surface" in " ".join(capsys.readouterr().out.split())
+    assert run("check", shot("good"), "--rig", shot("good") / "rig.toml") == 0

@@ -384,3 +384,14 @@ def test_a_cameras_dng_is_a_clip(shared_data: Path, tmp_path: Path, write_plan: 
     (frame,) = read_frames(clip)
     assert (clip.cfa, clip.channels, clip.colour, frame.image.shape) == ("RGGB", 3, "unknown", (1156, 1734))
     assert "DNG files hold linear light" in clip.warnings[0]
+
+
+@pytest.mark.parametrize(("white", "warned"), [(65535, False), (65536, True), (255, False)])
+def test_a_white_level_of_other_files_is_warned_of(
+    white: int, warned: bool, tmp_path: Path, write_plan: Callable[..., None]
+) -> None:
+    write_plan(tmp_path, white_level=white)
+    for number in range(3):
+        write_png(tmp_path / f"shot.{number}.png", 100)
+    said = " ".join(open_clip(tmp_path).warnings)
+    assert ("the largest code of these 16-bit files is 65535" in said) == warned

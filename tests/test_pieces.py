@@ -525,6 +525,8 @@ def test_what_cannot_be_shared_is_refused_in_a_sentence(tmp_path: Path, monkeypa
         ps.normals_of_takes(["clip"], workers=0, **given)
     with pytest.raises(UsageError, match="expected one of the two"):
         ps.normals_of_takes(["clip"], workers=2, scheduler="tcp://127.0.0.1:9", **given)
+    with pytest.raises(UsageError, match="`scheduler` nonsense: expected its address"):
+        ps.normals_of_takes(["clip"], scheduler="nonsense", **given)
     with pytest.raises(UsageError, match="several are named 'clip'"):
         ps.normals_of_takes(["a/clip", "b/clip"], **given)
     with pytest.raises(UsageError, match="names no clip"):

@@ -176,13 +176,17 @@ class LightFiles:
         return min(len(files) for files in self.by_light.values())
 
     def curve(self) -> tuple[str, str]:
-        """Return the name of the curve by which the first picture of every light codes light, and why.
+        """Return the name of the curve by which the first picture of every light codes light, and why: as they say,
+        else sRGB for JPEG, and light itself for all other kinds, which calibration is for.
 
         Raises PsvideoError where one cannot be read, or where they say different things.
         """
         first = [paths[0] for paths in self.by_light.values()]
         kind = KINDS[first[0].suffix.lower()]
-        return curve_of_pictures(first, kind, read_header(kind, first[0]), [stated_by(file) for file in first])
+        header, stated = read_header(kind, first[0]), [stated_by(file) for file in first]
+        if kind != "jpeg" and not header.transfer and not any(one.transfer for one in stated):
+            return "linear", f"the usual meaning of {kind.upper()} pictures of lights: they say nothing themselves"
+        return curve_of_pictures(first, kind, header, stated)
 
 
 def read_sets(

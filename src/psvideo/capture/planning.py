@@ -18,6 +18,8 @@ DARK_SLOT_EVERY_S = 0.5
 """Dark slots come about twice a second: often enough to follow ambient light, below any flicker that is felt."""
 
 
+MOST_CYCLE_S = 60.0
+"""No board plays a longer cycle (lights/protocol.md)."""
 BOARD_STEPS = 240
 """Flashes of a cycle that every known board holds (lights/protocol.toml)."""
 
@@ -72,6 +74,11 @@ def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
     if request.marker == "coded":
         return replace(plan, dark_code=_longest_code(len(lit)))
     round_s = sum(flash.duration_s + plan.dark_s for flash in lit)
+    if request.dark_every is not None and request.dark_every * round_s > MOST_CYCLE_S:
+        raise UsageError(
+            f"`dark_every` {request.dark_every}: the cycle would last {request.dark_every * round_s:.0f} s, and boards "
+            f"play {MOST_CYCLE_S:.0f} s at most. Give {int(MOST_CYCLE_S / round_s)} or fewer."
+        )
     return replace(plan, dark_every=request.dark_every or max(1, math.ceil(DARK_SLOT_EVERY_S / round_s)))
 
 

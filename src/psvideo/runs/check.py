@@ -22,16 +22,24 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
+from psvideo.plates.sequence import Round
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame_light, later_frames
+from psvideo.report.judge.of_rows import MOST_UNSEEN
+from psvideo.report.judge.result import NOISY_DEG
 from psvideo.report.judgement import Judgement
+from psvideo.report.observe.observed import Observed
 from psvideo.runs.instants.reporting import observing
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
+from psvideo.solve.instants import surfaces
+from psvideo.solve.normals.solving import Solving
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
+LEAST_LIGHTS = 3
+"""Fewer give no normals."""
 ROUNDS = 4
 """This many rounds are looked at, where the clip is long enough."""
 SPREAD = 6
@@ -150,9 +158,12 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     plan = take.clip.plan
     unmixing = None if known is None else unmixing_of(plan, known, channels=take.clip.channels)
     apart = take.unmixed(unmixing)
-    observed = observing(apart, known if unmixing is None else unmixing.rig)
+    rig = known if unmixing is None else unmixing.rig
+    observed = observing(apart, rig)
     for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
         observed.add(one)
+        if rig is not None and not observed.away and one.lights == apart.plan.lights:
+            _look_at_slopes(observed, one, apart.plan, rig)
         del one
     if not observed.facts:
         raise PsvideoError(
@@ -164,6 +175,17 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     partly = len(take.numbers) < len(numbers)
     take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s if partly else None
     return (seen, *judgements(apart.plan, timing, observed, take_s=take_s))
+
+
+def _look_at_slopes(observed: Observed, one: Round, plan: Plan, rig: Rig) -> None:
+    """Solve a round and look whether its normals are one surface's: directions that are mirrored, or lights exchanged,
+    explain the plates as well. Near lights would need the surface's distance for it; noise belongs to no surface, nor
+    does a round that was not seen whole."""
+    lights, whole = rig.select(plan.lights), observed.facts[-1].unseen_share <= MOST_UNSEEN
+    if whole and len(lights) >= LEAST_LIGHTS and all(light.direction is not None for light in lights):
+        surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True, fill=False))).surface
+        if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
+            observed.look_at_slopes(surface)
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:

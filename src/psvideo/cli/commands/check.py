@@ -88,27 +88,23 @@ def _check_as_they_come(voice: Voice, folder: Path, **options: Any) -> None:
 
     checks = check_folder(folder, caller=replace(voice.caller(), say=partial(_note, voice)), **options)
     _note(voice, f"Watching {folder} for new takes; Ctrl-C ends.")
-    _follow(voice, _until_stopped(checks))
+    _follow(voice, checks, until_stopped=True)
 
 
-def _until_stopped(checks: "Iterator[Check | Unread]") -> "Iterator[Check | Unread]":
-    """Give checks until Ctrl-C: of a folder that is watched there is no other end."""
-    with contextlib.suppress(KeyboardInterrupt):
-        yield from checks
-
-
-def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> bool:
-    """Say of take after take what was found, and end with a line that sums up; return whether all can be used."""
+def _follow(voice: Voice, checks: "Iterator[Check | Unread]", *, until_stopped: bool = False) -> bool:
+    """Say of take after take what was found, and end with a line that sums up; return whether all can be used.
+    ``until_stopped``: Ctrl-C is the usual end, as of a folder that is watched."""
     from psvideo.runs.steps.checked import Check
 
     last: dict[Path, bool | None] = {}
-    for found in checks:
-        if isinstance(found, Check):
-            last[found.path] = found.usable
-            _print_check(voice, found)
-        else:
-            last[found.path] = None
-            _print_fault(voice, found.path, found.fault)
+    with contextlib.suppress(KeyboardInterrupt) if until_stopped else contextlib.nullcontext():
+        for found in checks:
+            if isinstance(found, Check):
+                last[found.path] = found.usable
+                _print_check(voice, found)
+            else:
+                last[found.path] = None
+                _print_fault(voice, found.path, found.fault)
     read = [usable for usable in last.values() if usable is not None]
     _note(
         voice,

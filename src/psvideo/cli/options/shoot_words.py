@@ -1,5 +1,6 @@
 """From the words typed for ``capture-plan`` to the request that they mean."""
 
+import math
 from collections.abc import Sequence
 from typing import TypeVar, get_args
 
@@ -84,6 +85,9 @@ def _camera_wish(words: ShootWords) -> CameraWish:
 
 
 def _encoding(words: ShootWords) -> Encoding:
+    for option, level in (("--black", words.black), ("--white", words.white)):
+        if level is not None and not math.isfinite(level):
+            raise UsageError(f"{option} {level:g}: expected a code value, a finite number.")
     if words.black is not None and words.white is not None and words.black >= words.white:
         raise UsageError(
             f"--black {words.black:g} is not below --white {words.white:g}. Give the code of black and of saturation."

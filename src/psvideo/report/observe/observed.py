@@ -28,7 +28,7 @@ from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
-from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, share_away, surface_agreement
+from psvideo.report.observe.rig_and_curve.slopes import Averaged, coarse_normals, share_away, surface_agreement
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
 from psvideo.report.observe.shadow import shadow_light
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
@@ -228,11 +228,7 @@ class Observed:
             self.blurs_px.append(blur_px)
         yield
         if surface is not None:
-            small = coarse_normals(surface)
-            agreement = surface_agreement(surface, small)
-            if agreement is not None:
-                self.slopes.append(agreement)
-            self.away.append(share_away(surface))
+            small = self.look_at_slopes(surface)
             yield
             found = lean(small, lens=self.lens)
             if found is not None:
@@ -243,6 +239,15 @@ class Observed:
             self.light_at_points.append(self.points.light(one))
             if self.stills and one.number == self.first and seen.subject.any():
                 self._look_at_places(one, seen, self.points)
+
+    def look_at_slopes(self, surface: Surface) -> Averaged:
+        """Look whether normals are those of one surface, which faces the camera; return them coarsely."""
+        small = coarse_normals(surface)
+        agreement = surface_agreement(surface, small)
+        if agreement is not None:
+            self.slopes.append(agreement)
+        self.away.append(share_away(surface))
+        return small
 
     def _look_at_places(self, one: Round, seen: Seen, points: RigPoints) -> None:
         shape = one.plates[0].shape[:2]

@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,6 +21,8 @@ SILENT_S = 60
 """A worker that is not heard of for so long is started again, and its work is given to another."""
 SETTINGS = {"distributed.nanny.pre-spawn-environ": {}, "distributed.scheduler.worker-ttl": f"{SILENT_S}s"}
 """dask's own environment for workers sets MALLOC_TRIM_THRESHOLD_, which halves the speed of numpy."""
+ADDRESS = re.compile(r"([a-z]+://)?[^/]+:\d+/?|inproc://.+|[a-z]+://.+:\d+/.*")
+"""What a scheduler's address looks like: a host and its port, behind a protocol or not."""
 ANSWERS_S = 10
 """Within this a scheduler answers."""
 LOGGERS = ("distributed", "tornado", "tornado.application", "asyncio")
@@ -43,6 +46,10 @@ class Cluster:
             raise UsageError("`workers` starts processes here and `scheduler` uses others': expected one of the two.")
         if self.workers is not None and self.workers < 1:
             raise UsageError(f"`workers` {self.workers}: expected how many processes to start, 1 or more.")
+        if self.scheduler is not None and not ADDRESS.fullmatch(self.scheduler):
+            raise UsageError(
+                f"`scheduler` {self.scheduler}: expected its address as it says it itself, such as tcp://192.0.2.7:8786."
+            )
         require_dask()
 
 

@@ -64,7 +64,7 @@ class Reading:
 
     ``plan`` names the plan where none lies beside the pictures; ``frames`` chooses file numbers of a clip, or sets
     counted from 1; ``transfer`` says how stills code light (left out: as the plan says; without a plan as the files do,
-    else sRGB for 8 bits, and linear for more).
+    else sRGB for JPEG, and linear for other kinds).
     """
 
     plan: Path | None = None
@@ -88,7 +88,7 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
         twelve rounds.
     transfer
         How the files code light: "linear", "srgb", "rec709", "slog3" and others by OpenColorIO's names. Left out: as
-        the plan says; without a plan as the files do, else sRGB for 8 bits, and linear for more. The log says which.
+        the plan says; without a plan as the files do, else sRGB for JPEG, and linear for others. The log says which.
     plan
         The plan, where it does not lie beside the pictures: names the lights, and says how the files code light.
 

@@ -32,7 +32,7 @@ def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -
     elif step < 1:
         yield (
             f"Of every {step.denominator} frames the clip repeats {step.denominator - step.numerator}, regularly, as a "
-            f"movie that was made {rate:.6g} frames a second from {shown}; repeated ones are left out."
+            f"movie that was made {shown} from {rate:.6g}; repeated ones are left out."
         )
     if step == 1:
         yield from _many_missing(found, index, numbered)

@@ -130,8 +130,12 @@ def _camera(plan: Plan, found: ClipFit) -> Iterator[str]:
 def _wrong_readout(planned_s: float, readout_s: float, error_s: float) -> str:
     found = f"it takes {_ms(abs(readout_s), error_s)}, {_direction(readout_s)}"
     if planned_s * readout_s < 0:
-        fault = f"The plan's readout runs the wrong way: {found}, and the plan says {_direction(planned_s)}"
-    elif planned_s == 0:
+        return (
+            f"The plan's readout runs the wrong way: {found}, and the plan says {_direction(planned_s)}. Put readout_s "
+            f"= {readout_s:.6g} into plan.toml. Or the picture was turned by 180 degrees, or mirrored top to bottom, "
+            "after it was taken: then turn the rig's lights as well, for normals do not show that they are not."
+        )
+    if planned_s == 0:
         fault = f"The plan's camera has a global shutter, but the picture shows a rolling readout: {found}"
     else:
         fault = f"The plan's readout is wrong: {found}, and the plan says {_ms(abs(planned_s))}"
