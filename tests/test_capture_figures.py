@@ -190,6 +190,10 @@ def test_rows_that_hold_two_flashes_are_counted_as_their_shutter_sees_them(expos
         assert mixed_share(plan, exposure_s=exposure_s, dark_s=dark_s) == pytest.approx(truth, abs=0.002)
 
 
+def test_flashes_without_a_dark_time_have_no_margin() -> None:
+    assert shoot_figures(replace(paper_plan(1e-3), dark_s=0.0)).margin_ppm is None
+
+
 def test_rare_dark_slots_cost_their_share_of_the_rate() -> None:
     never = shoot_figures(paper_plan(1e-3, 1e-3, 1e-3))
     always = shoot_figures(paper_plan(1e-3, 1e-3, 1e-3, dark_slot_s=1e-3))

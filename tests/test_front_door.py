@@ -217,6 +217,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         lambda: ps.solve_images(GOOD, DIRECTIONS, mask=np.ones((5, 3), bool)),
         r"expected \(3, 5\) of bool",
     ),
+    "no images": (lambda: ps.solve_images(np.empty((0, 4, 5)), np.empty((0, 3))), "There are no images"),
     "empty mask": (lambda: ps.solve_images(GOOD, DIRECTIONS, mask=np.zeros((3, 5), bool)), "False everywhere"),
     "saturation": (lambda: ps.solve_images(GOOD, DIRECTIONS, saturation=0), "above 0 from which on"),
     "solver": (lambda: ps.solve_images(GOOD, DIRECTIONS, solver="robst"), "did you mean 'robust'"),  # type: ignore[arg-type]

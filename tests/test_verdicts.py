@@ -879,3 +879,14 @@ def test_frames_with_values_that_are_no_numbers_are_judged_by_the_others() -> No
     image = np.full((40, 40), 0.5, np.float32)
     image[0, 0] = np.nan
     assert frame_light(image).top == pytest.approx(0.5)
+
+
+def test_lights_that_were_never_seen_are_not_said_to_fire() -> None:
+    one = Observed(lights=("a", "b", "c"))
+    bright = count_levels(np.full(100, 0.5, np.float32), 1.0)
+    one.counts |= {"a": bright, "b": bright, "c": np.zeros_like(bright)}
+    for number in range(4):
+        one.facts.append(facts_of(number=number, levels=(0.4, 0.4, 0.4), clipped=(0.0,) * 3, white=(1.0,) * 3,
+                                  unseen_share=0.1 if number else 0.0))  # fmt: skip
+    (line,) = lamps(one)
+    assert line.found == "The 2 of 3 lights that were seen fire; the weakest gives 0.0 stops less than the strongest."

@@ -35,7 +35,10 @@ def show_seconds(seconds: float, *, figures: int = 4) -> str:
 
     >>> show_seconds(0.0008), show_seconds(0.000_05), show_seconds(1.5), show_seconds(0.000_157, figures=2)
     ('0.8 ms', '50 us', '1.5 s', '0.16 ms')
+    >>> show_seconds(0.99996), show_seconds(0.000_099_999_6)
+    ('1 s', '0.1 ms')
     """
+    seconds = float(f"{seconds:.{figures}g}")  # the unit is that of what is shown
     if abs(seconds) >= 1:
         return f"{seconds:.{figures}g} s"
     in_ms = abs(seconds) >= 1e-4 or seconds == 0

@@ -119,6 +119,8 @@ def checked_lights(directions: ArrayLike, intensities: ArrayLike | None, stack: 
             f"{len(stack)} images, or a Rig.{turned}"
         )
     check_count(len(vectors), stack)
+    if not len(vectors):
+        raise UsageError("There are no images, and no lights. Expected three of each at least.")
     lengths = np.linalg.norm(vectors, axis=1)
     worst = int(np.argmax(np.abs(lengths - 1)))
     if abs(lengths[worst] - 1) > UNIT_TOLERANCE:

@@ -86,7 +86,8 @@ def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigure
     def mean(share: str) -> float:
         return float(sum(times[slot] * getattr(slots[slot], share) for slot in plan.lit_slots) / lit)
 
-    margin_ppm = None if plan.mode == "synced" else (1 - plan.camera.exposure_s / plan.dark_s) * 1e6
+    no_margin = plan.mode == "synced" or not plan.dark_s  # flashes without a dark time between them have none to lose
+    margin_ppm = None if no_margin else (1 - plan.camera.exposure_s / plan.dark_s) * 1e6
     return ShootFigures(
         flash_rate_hz=lit / cycle_s,
         result_rate_hz=len(plan.dark_rounds) / cycle_s,

@@ -155,8 +155,13 @@ def separated(
     return Separated(begins=design.frames[0], image=total, stood=stood, known=design.known)
 
 
+def _first_row(rows: int) -> int:
+    """Return the first row that is looked at: the middle of the first few, as many as there are."""
+    return min(EVERY_ROW, rows) // 2
+
+
 def _small(image: Image) -> Image:
-    some = image[EVERY_ROW // 2 :: EVERY_ROW]
+    some = image[_first_row(len(image)) :: EVERY_ROW]
     some = np.ascontiguousarray(some if some.ndim == 2 else mean_of_channels(some))
     size = (max(some.shape[1] // BLOCK_PX, 1), len(some))
     return np.asarray(cv2.resize(some, size, interpolation=cv2.INTER_AREA), np.float32)
@@ -165,7 +170,7 @@ def _small(image: Image) -> Image:
 def _judged(design: Design, series: Image) -> tuple[Flags, Image]:
     """Return which blocks (row, col) the regression explains to their noise in all frames, and what that noise's
     variance is; ``series`` is (frame, row, col)."""
-    shares = design.shares[:, :, EVERY_ROW // 2 :: EVERY_ROW]
+    shares = design.shares[:, :, _first_row(design.shares.shape[2]) :: EVERY_ROW]
     terms = np.concatenate([np.ones((1, *shares.shape[1:])), shares])
     rest = np.empty(series.shape, np.float32)
     for row in range(series.shape[1]):

@@ -49,9 +49,13 @@ def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> It
         yield Judgement(
             subject="lights",
             grade="good",
-            found=f"All {len(observed.lights)} lights fire{' in every round' if timed else ''}; the weakest gives "
-            f"{spread:.1f} stops less than the strongest.",
+            found=f"{_all(len(named), len(known))} fire{' in every round' if timed and whole.all() else ''}; the "
+            f"weakest gives {abs(spread):.1f} stops less than the strongest.",
         )
+
+
+def _all(seen: int, lights: int) -> str:
+    return f"All {lights} lights" if seen == lights else f"The {seen} of {lights} lights that were seen"
 
 
 def _levels(facts: Sequence[InstantFacts]) -> NDArray[np.float64]:

@@ -98,7 +98,8 @@ def _parts(box: tuple[slice, slice]) -> Iterator[tuple[slice, slice]]:
         [slice(max(a, (a + b - PART_PX) // 2), min(b, (a + b + PART_PX) // 2)) for a, b in pairwise(side.tolist())]
         for side in edges
     )
-    yield from ((down, across) for down in downs for across in acrosses)
+    parts = ((down, across) for down in downs for across in acrosses)
+    yield from (part for part in parts if all(side.start < side.stop for side in part))
 
 
 def _vectors_at(points: RigPoints, part: tuple[slice, slice]) -> FloatArray:

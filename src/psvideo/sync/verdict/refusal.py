@@ -28,6 +28,9 @@ MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
 LITTLE_MORE = 2.0
 """Times the robust loss that more lights leave, which fewer may."""
 PERIOD_FRAMES, PERIOD_ROWS = 14, 8
+LEAST_GAP, LONGEST = 0.25, 2.5
+"""Periods are tried from so much of a frame's period after a flash to so many of them."""
+MOST_PERIODS = LONGEST - LEAST_GAP
 
 
 def nothing_to_find(plan: Plan, rows: Profiles) -> str:
@@ -169,7 +172,7 @@ def _described(plan: Plan, rival: Rival) -> str:
             ("flashes of", meant.flashes[meant.lit_slots[0]].duration_s, plan.flashes[plan.lit_slots[0]].duration_s),
             ("dark times of", meant.dark_s, plan.dark_s),
         )
-        if abs(other / planned - 1) > 1e-9
+        if abs(other - planned) > 1e-9 * other
     ]
     return (
         f"The picture fits {' and '.join(parts)} far better: the strobe played another plan, or its durations were "
@@ -178,6 +181,8 @@ def _described(plan: Plan, rival: Rival) -> str:
 
 
 def _other_strobe(plan: Plan, rows: Profiles) -> str:
+    if max(flash.duration_s for flash in plan.flashes) > MOST_PERIODS * rows.period_s:
+        return ""  # no period that is tried has room for such a flash
     period_s, gain, planned = other_period(plan, rows)
     flash_s = plan.flashes[plan.lit_slots[0]].duration_s
     planned_s = plan.dark_s + flash_s
@@ -217,6 +222,6 @@ def other_period(plan: Plan, rows: Profiles) -> tuple[float, float, float]:
     def gain(dark_s: float) -> float:
         return gain_of(part, unexplained(replace(plan, dark_s=dark_s), part, best(dark_s).beat))
 
-    periods_s = np.arange(longest_s + 0.25 * rows.period_s, 2.5 * rows.period_s, step_s).tolist()
+    periods_s = np.arange(longest_s + LEAST_GAP * rows.period_s, LONGEST * rows.period_s, step_s).tolist()
     period_s = min(periods_s, key=lambda one_s: best(one_s - longest_s).loss)
     return period_s, gain(period_s - longest_s), gain(plan.dark_s)
