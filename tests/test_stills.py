@@ -705,3 +705,24 @@ def test_a_name_that_begins_two_pictures_is_asked_about(tmp_path: Path) -> None:
     folder = named_pictures(tmp_path / "photos", ("a_1.jpg", "a_1_b.jpg", "a_2_b.jpg", "a_3_b.jpg"))
     found = pair_stills(folder, ("a_1", "a_2_b", "a_3_b"), named=True, whose="lights.lp")
     assert [file.name for file in found.files] == ["a_1.jpg", "a_2_b.jpg", "a_3_b.jpg"]
+
+
+def test_a_little_gloss_under_four_lights_is_no_other_curve(tmp_path: Path) -> None:
+    """A sheen looks as if sRGB pictures held light itself."""
+    lights = 4
+    y, x = np.mgrid[-1.2:1.2:96j, -1.2:1.2:96j]
+    bumps = 0.9 * np.stack([np.cos(4 * x) * np.sin(3 * y), np.sin(4 * x) * np.cos(3 * y), np.ones_like(x)], axis=-1)
+    normals = bumps / np.linalg.norm(bumps, axis=-1, keepdims=True)
+    angles = np.linspace(0, 2 * np.pi, lights, endpoint=False)
+    ways = np.stack([0.6 * np.cos(angles), 0.6 * np.sin(angles), np.full(lights, 0.8)], axis=-1)
+    lines = [str(lights)]
+    for number, way in enumerate(ways):
+        half = way + np.array([0.0, 0.0, 1.0])
+        half /= np.linalg.norm(half)
+        light = 0.5 * np.maximum(normals @ way, 0) + 0.1 * np.maximum(normals @ half, 0) ** 12
+        coded = np.where(light < 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+        Image.fromarray(np.round(255 * coded).astype(np.uint8)).save(tmp_path / f"img{number}.png")
+        lines.append(f"img{number}.png {way[0]} {way[1]} {way[2]}")
+    (tmp_path / "lights.lp").write_text("\n".join(lines) + "\n")
+    report = ps.stills(tmp_path, lights=tmp_path / "lights.lp", out=tmp_path / "out")
+    assert not any("fit the lights better" in line.sentence for line in report.judgements)
