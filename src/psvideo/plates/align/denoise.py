@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile, rising_parts
 from psvideo.model.surface import Surface
+from psvideo.plates.align.velocity.followed import mean_over
 
 Planes = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -81,14 +82,10 @@ def _alike(before: Average, now: Average, both: Flags) -> Flags:
     )  # the average is noisy as well, the less the longer it is
     level = np.sqrt((before.vectors**2).sum(axis=0))
     noise = _noise(np.asarray(apart / np.sqrt(share), np.float32), level, both)
-    expected = _mean(np.asarray(share * noise * both, np.float32))
-    each = _mean(np.sum(apart**2, axis=0, dtype=np.float32))
-    whole = np.sum([_mean(plane) ** 2 for plane in apart], axis=0)
+    expected = mean_over(np.asarray(share * noise * both, np.float32), WINDOW_PX)
+    each = mean_over(np.sum(apart**2, axis=0, dtype=np.float32), WINDOW_PX)
+    whole = np.sum([mean_over(plane, WINDOW_PX) ** 2 for plane in apart], axis=0)
     return np.asarray(both & (each <= MOST_CHANGE * expected) & (whole <= MOST_DRIFT * expected))
-
-
-def _mean(values: Planes) -> Planes:
-    return np.asarray(cv2.blur(values, (WINDOW_PX, WINDOW_PX)), np.float32)
 
 
 def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
