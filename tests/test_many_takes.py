@@ -1,6 +1,7 @@
 """The page over many takes: the worst first, what recurs named once, and a line for every take."""
 
 import re
+from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from psvideo.errors import PsvideoError
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.of_takes import TakeResult, takes_page, worst_first
-from psvideo.runs.many_takes.handed_out import do_piece
+from psvideo.runs.many_takes.handed_out import do_piece, result_of_future
 from psvideo.runs.many_takes.normals_of_takes import _counts
 from psvideo.runs.many_takes.several_takes import result_of, several_takes, whole_options
 from psvideo.runs.normals import normals
@@ -138,3 +139,21 @@ def test_a_report_that_cannot_be_read_is_that_take_s_fault(tmp_path: Path) -> No
     (tmp_path / "report.json").write_text("{", encoding="utf-8")
     assert f"{tmp_path / 'report.json'}: cannot be read" in result_of(tmp_path, tmp_path).fault
     assert "cannot be read" in result_of(tmp_path, tmp_path / "gone").fault
+
+
+class Finished:
+    """A future that is done, whose answer does not come: the scheduler died meanwhile."""
+
+    status, key = "finished", "one"
+
+    def __init__(self, fault: BaseException) -> None:
+        self.fault = fault
+
+    def result(self) -> str:
+        raise self.fault
+
+
+@pytest.mark.parametrize("fault", [OSError("Stream is closed"), CancelledError("client-request")])
+def test_an_answer_that_does_not_come_is_a_scheduler_that_is_gone(fault: BaseException) -> None:
+    with pytest.raises(PsvideoError, match=r"The cluster's scheduler is gone\. Run the command again"):
+        result_of_future(Finished(fault))

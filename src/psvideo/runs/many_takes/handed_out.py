@@ -3,12 +3,14 @@
 Where the scheduler dies, everything that was solved stays for ``resume``.
 """
 
+import asyncio
 import contextlib
 import threading
 import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
@@ -26,6 +28,10 @@ HANGS_S, HANGS_TIMES = 600.0, 10.0
 """A piece that takes longer than this, and than this many times the longest done so far, hangs: a disk that is gone
 holds a process for ever. (The first pieces may have to find a take's timing.)"""
 LOOKS_EVERY_S = 10.0
+GONE = (
+    "The cluster's scheduler is gone. Run the command again, here or on a cluster; what was written is kept beside the "
+    "outputs for `resume`."
+)
 
 
 class Shared(Protocol):
@@ -64,7 +70,7 @@ def done_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwa
         for future in watch(done, total=len(futures), what="solving", unit="pieces"):
             place = place_of[future.key]
             left[place] -= 1
-            fault = future.result() if future.status == "finished" else _fault(future)
+            fault = result_of_future(future)
             if fault:
                 faults.setdefault(place, fault)
             if left[place] == 0:
@@ -133,7 +139,7 @@ def called_apart(
     done = as_completed(futures, loop=client.loop, raise_errors=False)
     with _hanging_replaced(client, value_of):
         for future in watch(done, total=len(futures), what=what, unit="takes"):
-            yield value_of[future.key], future.result() if future.status == "finished" else _fault(future)
+            yield value_of[future.key], result_of_future(future)
 
 
 def do_piece(take: Shared, number: int, *, after: str) -> str:
@@ -153,11 +159,19 @@ def _called(call: Callable[[Value], Result], value: Value) -> Result | str:
         return str(fault)
 
 
+def result_of_future(future: "Future") -> Any:
+    """Return what a worker gave, or what is wrong. Raises PsvideoError where the scheduler is gone, by which the answer
+    comes."""
+    if future.status != "finished":
+        return _fault(future)
+    try:
+        return future.result()
+    except (OSError, CancelledError, asyncio.CancelledError):
+        raise PsvideoError(GONE) from None
+
+
 def _fault(future: "Future") -> str:
     if future.status in ("cancelled", "lost"):
-        raise PsvideoError(
-            "The cluster's scheduler is gone. Run the command again, here or on a cluster; what was written is kept "
-            "beside the outputs for `resume`."
-        )
+        raise PsvideoError(GONE)
     fault = future.exception()
     return str(fault) if isinstance(fault, PsvideoError) else f"{type(fault).__name__}: {fault}"
