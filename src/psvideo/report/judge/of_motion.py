@@ -49,7 +49,8 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         still = "Nothing moves." if most_px < 0.01 else f"At most {most_px:.2f} px of motion from flash to flash."
         if most_px > FAST_PX:
             still = (
-                f"In nine of ten rounds at most {step_px:.2f} px of motion from flash to flash; {most_px:.1f} px once."
+                f"In nine of ten rounds at most {step_px:.2f} px of motion from flash to flash, in the others up to "
+                f"{most_px:.1f} px."
             )
         return Judgement(subject="motion", grade="good", found=still)
     grave = step_px > LOST_PX and share > FEW_MOVE and not aligned
