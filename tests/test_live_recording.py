@@ -1,7 +1,11 @@
 """Recording live: a clip as any other, whole or not at all, whatever the disk does."""
 
 import errno
+import itertools
 import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +15,13 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
+from psvideo.errors import UsageError
 from psvideo.export.sequences import code_files
 from psvideo.live.chain import LiveFrame
 from psvideo.live.incoming import recording
 from psvideo.live.incoming.recording import Recording
 from psvideo.live.incoming.source import played_clip
+from psvideo.live.status import LiveStatus
 from psvideo.model.coded import Coded
 from psvideo.runs.live import live
 
@@ -93,6 +99,67 @@ def test_the_log_of_a_strobe_that_was_played_meanwhile_lies_in_the_recording(cli
         record.take(next(source.frames()))
         record.log = "what was played"
     assert (tmp_path / "rec" / "strobe.json").read_text(encoding="utf-8") == "what was played"
+
+
+def stopping(when: Callable[[LiveStatus], bool]) -> Callable[[LiveStatus], None]:
+    """Return what presses Ctrl-C once things stand so."""
+
+    def look(status: LiveStatus) -> None:
+        if when(status):
+            raise KeyboardInterrupt  # as Python does in the main thread, which says how things stand
+
+    return look
+
+
+def test_a_run_that_is_ended_by_ctrl_c_leaves_its_recording_and_its_timing_whole(tmp_path: Path) -> None:
+    clip, rec = live_clip(tmp_path, frames=700), tmp_path / "rec"
+    locked = stopping(lambda status: status.state == "locked")
+    summary = live(clip, record=rec, timing_out=tmp_path / "timing.json", said=locked)
+    assert len(ps.open_take(rec).numbers) == summary.recorded == summary.frames < 700
+    assert ps.read_timing(tmp_path / "timing.json").flashes
+
+
+def test_what_was_recorded_is_kept_where_no_strobe_is_found(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = played_clip(open_clip(clip))
+    first = next(source.frames())
+
+    def still() -> Iterator[LiveFrame]:
+        for place in itertools.count():
+            time.sleep(0.01)
+            yield replace(first, index=place, came_s=time.monotonic())
+
+    monkeypatch.setattr("psvideo.runs.live.opened_source", lambda *_, **__: replace(source, frames=still))
+    with pytest.raises(ps.PsvideoError, match=r"recorded all the same, and whole, in .*rec\.$"):
+        live("camera", record=tmp_path / "rec", said=stopping(lambda status: bool(status.recorded)))
+    assert ps.open_take(tmp_path / "rec").numbers
+
+
+def test_a_source_that_fails_leaves_the_frames_until_then_whole(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = played_clip(open_clip(clip), pace="fastest")
+
+    def broken() -> Iterator[LiveFrame]:
+        yield from itertools.islice(source.frames(), 60)
+        raise ps.PsvideoError("camera: the cable came out.")
+
+    monkeypatch.setattr("psvideo.runs.live.opened_source", lambda *_, **__: replace(source, frames=broken))
+    said = r"the cable came out\. 60 frames are recorded all the same, and whole, in .*rec\.$"
+    with pytest.raises(ps.PsvideoError, match=said):
+        live("camera", record=tmp_path / "rec")
+    assert len(ps.open_take(tmp_path / "rec").numbers) == 60
+
+
+def test_what_a_recording_that_was_killed_left_is_not_removed_unasked(clip: Path, tmp_path: Path) -> None:
+    left = tmp_path / ".rec.partial" / "frames"
+    left.mkdir(parents=True)
+    (left / "live.000001.tif").write_bytes(b"footage")
+    with pytest.raises(UsageError, match=r"was killed, and left 1 frame in"):
+        live(clip, record=tmp_path / "rec", pace="fastest")
+    assert (left / "live.000001.tif").read_bytes() == b"footage"
+    assert live(clip, record=tmp_path / "rec", pace="fastest", force=True).recorded == 110
 
 
 def test_nothing_appears_where_no_frame_was_recorded(clip: Path, tmp_path: Path) -> None:

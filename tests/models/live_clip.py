@@ -6,10 +6,11 @@ from lit_ball import LIT_BALL
 
 from psvideo.synth.shoot import shoot
 
+FRAMES = 110
 SCENE = f"""
 schema = "psvideo-scene/1"
 name = "sphere"
-frames = 110
+frames = {FRAMES}
 seed = 3
 [camera]
 width_px = 96
@@ -24,8 +25,8 @@ clock_offset_ppm = 40.0
 {LIT_BALL}"""
 
 
-def live_clip(folder: Path) -> Path:
+def live_clip(folder: Path, *, frames: int = FRAMES) -> Path:
     """Film the sphere into a folder and return the clip."""
-    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    (folder / "scene.toml").write_text(SCENE.replace(f"frames = {FRAMES}", f"frames = {frames}"), encoding="utf-8")
     shoot(folder / "scene.toml", folder / "clip")
     return folder / "clip"

@@ -129,18 +129,32 @@ class Running:
         reading = threading.Thread(target=self._guarded, args=(self._read,), name="psvideo frames", daemon=True)
         reading.start()
         threads = [reading, run_beside(partial(self._guarded, self._make), name="psvideo results")]
-        before, said_s = (0, 0), time.monotonic()
-        while not self._stop.wait(STATUS_S):
-            now_s = time.monotonic()
-            status = self._status(now_s - began_s, now_s - said_s, before)
-            self._adapt(status)
-            before, said_s = (status.frames, status.results), now_s
-            self.said(status)
+        asked = self._until_over(began_s)
         for thread in threads:
             thread.join(LEAVES_S)
+        if asked:  # whoever ends a run waits for no search
+            return
         self.chain.wait(SEARCH_S)  # a short clip may end before the strobe is found in it
         if not threads[-1].is_alive():  # else it is solving, and two would use one memory
             self._solve()
+
+    def _until_over(self, began_s: float) -> bool:
+        """Say each second how things stand, until the frames end or somebody ends the run; return whether somebody did.
+
+        Ctrl-C is how live runs of cameras end: what was recorded and followed is written as at the end of a clip.
+        """
+        before, said_s = (0, 0), time.monotonic()
+        try:
+            while not self._stop.wait(STATUS_S):
+                now_s = time.monotonic()
+                status = self._status(now_s - began_s, now_s - said_s, before)
+                self._adapt(status)
+                before, said_s = (status.frames, status.results), now_s
+                self.said(status)
+        except KeyboardInterrupt:
+            self.stop()
+            return True
+        return False
 
     def _guarded(self, run: Callable[[], None]) -> None:
         try:

@@ -17,7 +17,7 @@ from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.following.history import timing_of
 from psvideo.live.following.lock import check_followed
-from psvideo.live.incoming.recording import recording
+from psvideo.live.incoming.recording import recorded_words, recording
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.incoming.sources import opened_source
 from psvideo.live.running import Running
@@ -78,7 +78,8 @@ def live(
     - ``rig``: where the lights are; without it there are plates and no normals.
     - ``rig_out``: a rig.toml to write when lights are found on a chrome ball, by a click on the page.
     - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
-    - ``record``: a clip folder to record the frames into, whole or not at all.
+    - ``record``: a clip folder to record the frames into, whole or not at all: of a run that is stopped (Ctrl-C) or
+      ends in a fault, the frames until then.
     - ``lock``: play the plan on the board at the port ``strobe`` ("auto": by USB identity), and trim its period so that
       the dark row stands still: at the frame's "edge", at a row ("300"), or far from some rows ("200-500").
       ``yes``: everybody in the room has been warned of the flashing.
@@ -133,7 +134,8 @@ def live(
         summary = replace(summary, recorded=recorded.written, notes=running.all_notes)
     if running.chain.follower is None:
         few = f"{played.name}: {summary.frames} frames are too few to find the strobe in. Let it run for longer."
-        raise NoStrobeError(running.chain.why or few)
+        whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
+        raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
     if timing_path is not None:
         write_text(timing_path, format_timing(_timing(running.chain, played)))
     return summary

@@ -1,7 +1,8 @@
 """Recording while the camera runs: every frame in its codes, a clip as any other, whole or not at all.
 
 Frames wait in memory for the disk, up to a limit. Where the disk falls behind so far, or fills, recording ends there
-and says so: what was recorded until then is a clip without a hole.
+and says so: what was recorded until then is a clip without a hole. So it is where the run ends in a fault: nobody can
+film a take again as it was.
 """
 
 import shutil
@@ -19,9 +20,10 @@ from numpy.typing import NDArray
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.sequences.code_files import write_codes
 from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
-from psvideo.formats.whole_folders import whole_folder
+from psvideo.formats.whole_folders import unfinished_folder_of, whole_folder
 from psvideo.live.chain import LiveFrame
 from psvideo.live.incoming.source import LiveSource
+from psvideo.model.units import counted
 from psvideo.strobe.runlog import LOG_NAME
 
 MOST_WAITING_BYTES = 256_000_000
@@ -105,15 +107,18 @@ class Recording:
 def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Recording]:
     """Give what records a source into a clip folder; when the block ends, the folder appears under its name.
 
-    The plan lies in it as it lay before, and the strobe's log: the recording's own, or the one beside the plan. Raises
-    UsageError where the folder exists, or the source's frames are not plain codes, and PsvideoError where not one frame
-    was recorded.
+    The plan lies in it as it lay before, and the strobe's log: the recording's own, or the one beside the plan. A block
+    that fails raises what it raised once the frames until then are whole, with a sentence that says so. Raises
+    UsageError where the folder exists, where a recording that was killed left frames beside it, or the source's frames
+    are not plain codes, and PsvideoError where not one frame was recorded.
     """
     if source.plan_path is None:
         raise UsageError(
             f"`record` {path}: {source.name} does not come as codes of 8 or 16 bits that the plan explains. Copy a "
             "clip as it is, and record from a pipe whose bare bytes `raw` names, such as gray or gray16le."
         )
+    _refuse_left(path, force=force)
+    failed: BaseException | None = None
     with whole_folder(path, mark=PLAN_FILE, force=force) as folder:
         (folder / FRAMES).mkdir(exist_ok=True)
         log = source.plan_path.with_name(LOG_NAME)
@@ -125,10 +130,33 @@ def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Record
         writer.start()
         try:
             yield record
-        finally:
-            record.over()
-            writer.join()
-            if record.log:
-                (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
+        except BaseException as fault:  # raised again below, when the folder is whole
+            failed = fault
+        record.over()
+        writer.join()
+        if record.log:
+            (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
         if not record.written:
-            raise PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())
+            raise failed or PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())
+    if isinstance(failed, PsvideoError):
+        raise type(failed)(f"{failed} {recorded_words(path, record)}") from failed
+    if failed is not None:
+        raise failed
+
+
+def recorded_words(path: Path, record: Recording) -> str:
+    """Say what a recording holds of a run that ended in a fault."""
+    verb = "is" if record.written == 1 else "are"
+    return f"{counted(record.written, 'frame').capitalize()} {verb} recorded all the same, and whole, in {path}."
+
+
+def _refuse_left(path: Path, *, force: bool) -> None:
+    """Raise UsageError where a recording of this name was killed, and its frames would be removed to begin again."""
+    left = unfinished_folder_of(path)
+    count = sum(1 for _ in (left / FRAMES).glob("*.tif"))
+    if count and not force:
+        raise UsageError(
+            f"`record` {path}: a recording under this name was killed, and left {counted(count, 'frame')} in {left}. "
+            "Rename that folder to keep them (the last file may be cut short), name another one, or discard them with "
+            "`force`."
+        )
