@@ -16,6 +16,8 @@ import pytest
 import psvideo
 from psvideo.cli.console import compiling_said
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
+from psvideo.live.showing import smaller
+from psvideo.model.coded import Coded
 from psvideo.plates.ambient import ambient_kernel
 from psvideo.runs.steps.compiling import USUAL, SmallTake, run_small
 from psvideo.solve.filling import looking
@@ -24,6 +26,8 @@ from psvideo.solve.normals.least_squares import kernel
 from psvideo.solve.normals.least_squares.woodham1980 import solve
 from psvideo.solve.normals.loops import near_kernel
 from psvideo.solve.normals.robust import robust_kernel
+from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.profiles import Profiles, compiled_rows
 from psvideo.synth import read_scene
 
 SOURCE = Path(psvideo.__file__).parent
@@ -265,6 +269,29 @@ def test_every_module_loads_and_loops_run_where_no_folder_can_be_written_for_com
     where_nothing_can_be_kept(copy)
 
 
+def test_some_of_the_rows_need_no_loops_of_their_own() -> None:
+    every = Profiles(
+        value=np.ones((3, 8)),
+        index=np.arange(3),
+        period_s=0.01,
+        place=np.arange(8.0),
+        window_start=np.zeros(1, np.int64),
+        restless=np.zeros(8),
+    )
+    beat = Beat(clock=FoundClock(phase_s=0.001, offset_ppm=0.0), row_time_s=0.001, exposure_s=0.01)
+    for rows in (every, every.only_rows(slice(1, None, 2))):
+        parts = [part for part in compiled_rows(rows, beat) if isinstance(part, np.ndarray)]
+        assert all(part.flags.c_contiguous for part in parts)
+
+
+def test_live_pictures_of_colour_need_no_loop_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    orders: list[bool] = []
+    monkeypatch.setattr(smaller, "average", lambda _, __, of, *___: orders.append(of.flags.c_contiguous))
+    for shape, cfa in (((4, 4), None), ((4, 4), "RGGB"), ((4, 4, 3), None)):
+        smaller.Smaller(step=2, cfa=cfa).of(Coded(codes=np.zeros(shape, np.uint8)))
+    assert orders == [True, True, True]
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("command", ["sync", "normals"])
 def test_whole_commands_run_where_no_folder_can_be_written_for_compiled_code(
@@ -282,6 +309,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import psvideo as ps
+from psvideo.runs.doctor import doctor
 from psvideo.runs.steps.compiling import GLOSS, SmallTake, filmed
 folder = Path(sys.argv[1])
 logging.getLogger("psvideo.compiling").setLevel(logging.INFO)
@@ -290,10 +318,12 @@ moving = ", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }"
 inside = np.zeros((120, 96), np.uint8)
 inside[20:100, 20:80] = 255
 cv2.imwrite(str(folder / "mask.png"), inside)
+doctor(folder)
 takes = (
     (SmallTake(lights=4), {"mask": folder / "mask.png"}),
     (SmallTake(lights=8, gloss=GLOSS), {"mask": folder / "mask.png", "float32": True}),
     (SmallTake(lights=5, kind="exr"), {"fill": False}),
+    (SmallTake(lights=4, kind="exr", motion=moving, float32=True), {"float32": True}),
     (SmallTake(lights=8), {"solver": "least-squares", "aov": ("residual", "error")}),
     (SmallTake(lights=3), {"solver": "robust"}),
     (SmallTake(lights=4, near=True), {}),
@@ -305,6 +335,7 @@ for number, (take, how) in enumerate(takes):
     (folder / str(number)).mkdir()
     clip = filmed(take, folder / str(number))
     ps.normals(clip, rig=clip / "rig.toml", out=folder / f"out{number}", **how)
+ps.split(folder / "0" / "clip", out=folder / "split", method="hudon2015")
 for lights in (3, 4, 5, 9, 12):
     around = np.arange(lights) * 2 * np.pi / lights
     ways = np.stack([0.5 * np.cos(around), 0.5 * np.sin(around), np.full(lights, 0.75**0.5)], axis=-1)

@@ -92,7 +92,7 @@ def _channels(cfa: str | None, channels: int) -> tuple[NDArray[np.int64], int]:
     them.
     """
     if cfa is None or channels > 1:
-        return np.broadcast_to(np.arange(channels), (2, 2, channels)).astype(np.int64), channels
+        return np.tile(np.arange(channels, dtype=np.int64), (2, 2, 1)), channels
     return np.array([CHANNELS[name] for name in cfa], np.int64).reshape(2, 2, 1), 3
 
 

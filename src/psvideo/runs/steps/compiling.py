@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
+
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.quantities import Aov
@@ -31,7 +33,8 @@ GLOSS = ", specular = { strength = 0.3, roughness = 0.35 }"
 @dataclass(frozen=True, kw_only=True)
 class SmallTake:
     """A take that makes loops compile: its number of lights, whether its rig says that they stand ``near``, its files
-    and camera, what is asked of it, and whether it is watched live too."""
+    and camera, what is asked of it, and whether it is watched live too. Where results are ``float32``, its frames are
+    too."""
 
     lights: int
     near: bool = False
@@ -65,7 +68,7 @@ USUAL = (
     SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }", aov=("depth",)),
     SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
     SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"', live=True),
-    SmallTake(lights=3, kind="exr", float32=True),
+    SmallTake(lights=3, kind="exr", float32=True),  # frames of 32 bits, as Algorithm 1's pictures are
     SmallTake(lights=3, near=True),
 )
 """What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many, far and near; at rest and
@@ -109,9 +112,20 @@ def filmed(take: SmallTake, folder: Path) -> Path:
     scene, clip = folder / "small.toml", folder / "clip"
     scene.write_text(take.scene, encoding="utf-8")
     shoot(scene, clip)
+    if take.float32:
+        _as_floats(clip / "frames")
     if take.near:
         write_rig(clip / "rig.toml", SmallPictures(lights=take.lights, near=True).rig)
     return clip
+
+
+def _as_floats(frames: Path) -> None:
+    """Write half-float frames again as 32-bit floats, as renderers do: pictures that no code of 16 bits holds."""
+    from psvideo.clip.decode.exr import read_halves
+    from psvideo.formats.exr_files import write_exr
+
+    for path in frames.glob("*.exr"):
+        write_exr(path, {"Y": read_halves(path).planes[0].astype(np.float32)}, half=False)
 
 
 def run_small(take: SmallTake) -> None:

@@ -59,9 +59,9 @@ class Profiles:
         return replace(
             self,
             value=np.ascontiguousarray(self.value[:, rows]),
-            place=self.place[rows],
+            place=np.ascontiguousarray(self.place[rows]),  # else loops were compiled for it once more
             doubt=None if self.doubt is None else self.doubt[:, rows],
-            restless=None if self.restless is None else self.restless[rows],
+            restless=None if self.restless is None else np.ascontiguousarray(self.restless[rows]),
         )
 
     def one_window(self) -> "Profiles":

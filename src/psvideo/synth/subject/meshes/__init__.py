@@ -4,7 +4,11 @@ Every mesh is in metres at a natural size, y up, facing +z. ``basic`` has plain 
 things; ``head`` is sculpted with ``fields`` and made a mesh by ``surface_nets``.
 """
 
+import dataclasses
 from collections.abc import Callable
+from functools import cache
+
+import numpy as np
 
 from psvideo.synth.subject.meshes.basic import box, cylinder, plane, sphere
 from psvideo.synth.subject.meshes.fan import fan_blades, fan_cage
@@ -23,6 +27,12 @@ def builtin_names() -> tuple[str, ...]:
     return tuple(_MAKERS)
 
 
+@cache
 def builtin_shape(name: str) -> Shape:
-    """Make a built-in mesh; ``name`` is one of ``builtin_names()``."""
-    return _MAKERS[name]()
+    """Make a built-in mesh, once in a process: the bust takes 3 s. ``name`` is one of ``builtin_names()``; what is
+    returned cannot be written into."""
+    shape = _MAKERS[name]()
+    for one in dataclasses.fields(shape):
+        if isinstance(held := getattr(shape, one.name), np.ndarray):
+            held.flags.writeable = False
+    return shape
