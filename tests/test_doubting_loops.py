@@ -104,8 +104,8 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
     sure = torn - of_torn.SURELY_TORN**2 * (noise_deg**2 + uneven * misfit_deg**2)
     likely = torn - of_torn.SURELY_TORN**2 * uneven * misfit_deg**2 - of_torn.TORN_OF_NOISE**2 * noise_deg**2
     around, far_around = widths
-    far = mean(sums, far_around) / np.maximum(mean(counts, far_around), of_signs.LEAST_LIGHTS)
-    near = (mean(sums, around) + of_signs.LEAST_LIGHTS * far) / (mean(counts, around) + of_signs.LEAST_LIGHTS)
+    far = mean(sums, far_around) / np.maximum(mean(counts, far_around), of_signs.LEAST_UNREACHED)
+    near = (mean(sums, around) + of_signs.LEAST_UNREACHED * far) / (mean(counts, around) + of_signs.LEAST_UNREACHED)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(noise_deg), 0)
     added = np.linalg.pinv(one.lit.directions) @ np.ones(lights)
     along = np.tensordot(added, points.planes.astype(float), 1)

@@ -212,9 +212,9 @@ def test_noise_turns_normals_by_the_light_that_their_place_gets() -> None:
         return float(np.sqrt(np.mean((g[:, 0] ** 2 + g[:, 1] ** 2) / g[:, 2] ** 2)))
 
     middle, wall = (SIZE // 2, SIZE // 2), (SIZE // 2, SIZE // 10)
-    foretold = np.sqrt(found.wider[wall]) / found.dim[wall] / (np.sqrt(found.wider[middle]) / found.dim[middle])
-    assert foretold > 2
-    assert foretold == pytest.approx(turned(*wall) / turned(*middle), rel=0.1)
+    predicted = np.sqrt(found.wider[wall]) / found.dim[wall] / (np.sqrt(found.wider[middle]) / found.dim[middle])
+    assert predicted > 2
+    assert predicted == pytest.approx(turned(*wall) / turned(*middle), rel=0.1)
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.003, 0.006])

@@ -1,4 +1,4 @@
-"""A strobe that stops during a clip, or begins late or anew elsewhere in its cycle: each part is timed by itself."""
+"""A strobe that stops during a clip, or begins late, or restarts: each part is timed by itself."""
 
 from collections.abc import Callable
 from dataclasses import replace

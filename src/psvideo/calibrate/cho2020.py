@@ -19,11 +19,11 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 
 LIT, LEAST_REACHED = 0.08, 5
-"""A light reaches a pixel that it lights at least this much of its brightest one; so many lights (all of four) must."""
+"""A light reaches a pixel that it gives at least this much of its brightest one; this many (all of four) must."""
 LEAST_PIXELS, LEAST_OF_A_LIGHT, MOST_PIXELS = 300, 100, 4_000
-"""Of so few pixels nothing is measured, nor of a light that reaches so few of them; so many are enough."""
+"""Fewer pixels measure nothing, nor a light that reaches fewer than the second; more than the third are not needed."""
 BLOCKS, FEWEST_OF_A_BLOCK = 4, 20
-"""The jackknife leaves out one of this many times this many blocks of the picture, of which so many pixels counted."""
+"""The jackknife leaves out one of this many times this many blocks of the picture, if this many pixels counted."""
 TURNS, WIDTH = 6, 2.0
 """How often weights are found again, and how wide they are in standard deviations of what is left over."""
 DIRECTIONS_DEG, TRIALS = 1.0, 8

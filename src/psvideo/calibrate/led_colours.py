@@ -9,7 +9,7 @@ from psvideo.calibrate.flat_field import Target, on_target
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.irradiance.colours import CHANNELS, MAX_CONDITION, colour_condition, lamps_of, most_alike
+from psvideo.model.irradiance.colours import CHANNELS, MOST_COLOUR_CONDITION, colour_condition, lamps_of, most_alike
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light, Rig
 
@@ -54,7 +54,7 @@ def measure_led_colours(
     colours = LedColours(
         names=pictures.names, seen=seen, error=error, together=groups[worst], condition=conditions[worst]
     )
-    if colours.condition > MAX_CONDITION:
+    if colours.condition > MOST_COLOUR_CONDITION:
         raise _inseparable(colours)
     return colours
 
@@ -98,7 +98,7 @@ def _inseparable(found: LedColours) -> PsvideoError:
     one, other = most_alike(seen)
     return PsvideoError(
         f"The colours of {', '.join(found.together)} cannot be separated: their condition number is "
-        f"{found.condition:.3g} (at most {MAX_CONDITION:g} is accepted), and {found.together[one]} and "
+        f"{found.condition:.3g} (at most {MOST_COLOUR_CONDITION:g} is accepted), and {found.together[one]} and "
         f"{found.together[other]} are most alike. Take LEDs of other colours (red, green and blue are told apart with "
         "about 1.5), check that each picture shows one LED alone, and that the pictures' curve is named by `transfer`."
     )

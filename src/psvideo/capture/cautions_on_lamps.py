@@ -6,9 +6,9 @@ from psvideo.capture.caution import Caution, warning
 from psvideo.capture.request import Limits
 from psvideo.model.cost.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures
 from psvideo.model.plan import Plan
+from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.units import show_seconds
 
-LEAST_LIGHTS = 3
 MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
 

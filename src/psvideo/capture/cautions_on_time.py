@@ -47,7 +47,7 @@ def about_blind_time(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
 
 
 def in_step_words(plan: Plan, never: float) -> str:
-    """Say that rows never see a light since the strobe keeps step with the frames, and which dark time mends it."""
+    """Say that rows never see a light since the strobe keeps step with the frames, and which dark time avoids it."""
     other_s = dark_s_out_of_step(plan)
     longer = "" if other_s is None else f", or `dark_s` to {show_seconds(other_s)}"
     return (

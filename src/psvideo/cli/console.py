@@ -20,11 +20,10 @@ if TYPE_CHECKING:
 
 from psvideo.cli.options.clip_and_run import Json, Quiet, Verbose
 from psvideo.cli.spelling import spelled, spelled_within
+from psvideo.compute.compile_count import COMPILING
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
-COMPILING = logging.getLogger("psvideo.compiling")
-"""Where ``compute.compiled`` says that it compiles; got by name, because loading that loads the compiler."""
 
 
 @contextlib.contextmanager

@@ -21,7 +21,7 @@ if sys.platform != "win32":
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Ctrl-C; what systems and farms send to end a program; a terminal that is closed."""
 LATER_S = 0.01
-"""A stop that Python dropped is raised again after so long: not where it was dropped, and not felt."""
+"""A stop that Python dropped is raised again after this long: not where it was dropped, and not felt."""
 NO_MEMORY = (
     "there is not enough memory{said}. Nothing half-made was left under a final name. Close other programs, compute "
     "with fewer threads (PSVIDEO_THREADS=1), or take a machine with more memory; split and normals go on with `resume`."

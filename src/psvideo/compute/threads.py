@@ -144,13 +144,13 @@ def in_order(
 
 
 @contextlib.contextmanager
-def writing(*, threads: int = WRITING_THREADS, most_waiting: int = MOST_WAITING) -> Iterator[Submit]:
+def writing(*, most_waiting: int = MOST_WAITING) -> Iterator[Submit]:
     """Give a function that takes jobs (functions without arguments) and runs them in up to this many threads.
 
     It blocks while ``most_waiting`` jobs are under way, and raises what a job before raised; so does the end of the
     block, which waits for all jobs. A block that fails waits for them too: what was computed is kept for resuming.
     """
-    pool = ThreadPoolExecutor(min(threads, thread_count()), thread_name_prefix="write")
+    pool = ThreadPoolExecutor(min(WRITING_THREADS, thread_count()), thread_name_prefix="write")
     waiting: deque[Future[None]] = deque()
 
     def submit(job: Callable[[], None]) -> None:

@@ -9,13 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from psvideo.compute.threads import THREADS
+
 VERSION = "jobtemplate-2023-09"
 TEMPLATE_FILE = "template.json"
 VALUES_FILE = "values.json"
 """The paths, as the program openjd reads them."""
 SUBMITTED_FILE = "parameter_values.json"
 """The paths, as Deadline Cloud reads them."""
-THREADS = "PSVIDEO_THREADS"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from fractions import Fraction
 from psvideo.model.units import NTSC
 
 ROUNDED = Fraction(200, 1_000_000)
-"""A rate that is written with a point may be rounded by so much of it."""
+"""A rate that is written with a point may be rounded by this share of it."""
 
 
 def parse_fps(fps: float | str) -> Fraction:

@@ -31,9 +31,9 @@ from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
 
 GRID_PX = 240
-"""What is trusted of a picture that is gone in a moment is told by half as many points a side as of one that stays."""
+"""A live surface is judged at half as many points a side as one that stays: it is shown for a moment."""
 LOOKED_AGAIN = 32
-"""What the subject reflects beyond n . l is found again after so many rounds: finding it takes a few ms."""
+"""What the subject reflects beyond n . l is found again after this many rounds: finding it takes a few ms."""
 Search = Callable[[Callable[[], None]], None]
 """Runs a search: now, or beside what else goes on."""
 

@@ -8,9 +8,9 @@ from psvideo.compute.compile_count import CompileCount
 from psvideo.model.units import counted
 
 USUAL_S = 60
-"""Compiling takes so long or less on a machine that is not busy (docs/decisions/first-run.md)."""
+"""Compiling takes at most this long on a machine that is not busy (docs/decisions/first-run.md)."""
 RECENT_S = 3.0
-"""A loop that was begun within so long is likely to be compiled still."""
+"""A loop that was begun less than this ago is likely still being compiled."""
 
 
 def prepared(prepare: Callable[[], None], *, said: Callable[[], None], every_s: float) -> str:

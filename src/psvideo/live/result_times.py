@@ -12,7 +12,7 @@ from psvideo.live.status import LiveStatus
 from psvideo.model.plan import Plan
 
 STATUS_S = 1.0
-"""A status is said so often."""
+"""A status is sent this often."""
 
 
 @dataclass(kw_only=True)

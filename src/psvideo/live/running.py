@@ -27,12 +27,12 @@ from psvideo.live.status import LiveState, LiveStatus, LiveSummary
 from psvideo.live.waiting import Waiting
 
 IDLE_S = 0.1
-"""Whoever waits for a frame looks so often whether the run is over."""
+"""Whoever waits for a frame looks this often whether the run is over."""
 SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
 LEAVES_S = 5.0
-"""Whoever reads a source that is silent hears only with its next frame that the run is over, and is waited for so long.
-"""
+"""Whoever reads a source that is silent hears only with its next frame that the run is over, and is waited for
+this long."""
 Shows = Callable[[NewestRound], None]
 Meanwhile = Callable[[NewestRound, float], None]
 Said = Callable[[LiveStatus], None]

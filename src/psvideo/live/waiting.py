@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from psvideo.live.status import LiveState
 
 SILENT_S = 3.0
-"""A source that gives nothing for so long is said to be silent: cameras and networks pause for less."""
+"""A source that gives nothing for this long is said to be silent: cameras and networks pause for less."""
 AGAIN_S = 10.0
-"""Reasons differ a little from search to search: another one is said after so long."""
+"""Reasons differ a little from search to search: another one is said after this long."""
 
 
 @dataclass(kw_only=True)

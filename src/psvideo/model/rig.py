@@ -14,6 +14,8 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.units import counted
 
 Vector = tuple[float, float, float]
+LEAST_LIGHTS = 3
+"""Fewer lights give no normals."""
 
 
 def vector(values: Sequence[float] | FloatArray) -> Vector:

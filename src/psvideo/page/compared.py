@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.memory import HALF_MAX
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import timing_record
 from psvideo.model.choices import SplitMethod
 from psvideo.model.timing import Timing, places_in_time
-from psvideo.page.picture import HALF_MAX
 
 if TYPE_CHECKING:
     from psvideo.clip import Take

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.halves import halves_of
+from psvideo.compute.memory import HALF_MAX
 from psvideo.pictures.on_screen import smaller
 
 MAGIC = b"PSVB"
-HALF_MAX = 65504.0
 Plane = NDArray[np.floating]
 Number = TypeVar("Number", bound=np.generic)
 

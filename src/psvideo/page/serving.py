@@ -34,7 +34,7 @@ PICTURE = re.compile(r"/picture/([A-Za-z0-9_.:+-]+)/(\d{1,9})")
 MOST_PORT = 65535
 """Ports are numbers of 16 bits (RFC 9293)."""
 STALE_S = 20.0
-"""A connection on which nothing is asked for so long is closed."""
+"""A connection on which nothing is asked for this long is closed."""
 
 
 class PageServer(ThreadingHTTPServer):

@@ -1,7 +1,7 @@
 """Rolling-flash reconstruction: frames and their Timing in, one plate for every flash out.
 
-Each plate is a picture by its recipe (``model.recipe``), which says what of which frame's rows makes it up; nothing is
-added up before somebody wants to see it. It still holds the ambient light of every exposure in it;
+Each plate is a picture by its recipe (``model.rows.recipe``), which says what of which frame's rows makes it up;
+nothing is added up before somebody wants to see it. It still holds the ambient light of every exposure in it;
 ``ambient_off`` takes it off.
 """
 

@@ -14,7 +14,7 @@ from psvideo.plates.part import Part
 from psvideo.plates.sequence import FIRST_NUMBER, Round, round_numbers
 
 EACH, MOST = 16, 4
-"""One of so many rounds is looked at, and no more than this many: what comes in or turns after a while is seen."""
+"""One round of this many is looked at, and at most this many in all, so that what comes in or turns later is seen."""
 
 
 def spread_over(rounds: Sequence[int]) -> tuple[int, ...]:

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from psvideo.capture.caution import Caution
-from psvideo.capture.cautions_on_lamps import LEAST_LIGHTS
 from psvideo.capture.drawing.diagram import check_diagram_name, write_diagram
 from psvideo.capture.planning import Shoot, plan_shoot
 from psvideo.capture.request import ShootRequest
@@ -16,6 +15,7 @@ from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.plan import Plan
+from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.solve.normals.illumination import illumination
 
 MARK = "psvideo-plan/"

@@ -18,7 +18,7 @@ from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.model.plan import Plan
-from psvideo.model.rig import Rig
+from psvideo.model.rig import LEAST_LIGHTS, Rig
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
@@ -38,8 +38,6 @@ from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
-LEAST_LIGHTS = 3
-"""Fewer give no normals."""
 ROUNDS = 4
 """This many rounds are looked at, where the clip is long enough."""
 SPREAD = 6

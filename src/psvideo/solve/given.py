@@ -12,7 +12,6 @@ from psvideo.model.rig import UNIT_TOLERANCE, Light
 
 Images = NDArray[np.float32]
 Mask = NDArray[np.bool_]
-LEAST_LIGHTS = 3
 MOST_CLIPPED = 0.5
 """Where half of the pixels are clipped under every light, the scale is wrong rather than the exposure."""
 

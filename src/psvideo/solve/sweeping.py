@@ -21,7 +21,7 @@ from psvideo.solve.near_surface import NearSurface
 from psvideo.solve.normals.plate_noise import noise_of
 from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
 
-LEAST_LIGHTS = 5
+LIGHTS_FOR_SWEEPING = 5
 """With four there is one number over for the distance, and nothing to see a highlight by."""
 POINTS = 72
 """Points along the picture's longer side: distances are found for neighbourhoods."""
@@ -52,7 +52,7 @@ def swept(
 
     seen: (light, row) or (light, row, col), what was seen of the plates. Plates are on a scale on which 1 is clipped.
     """
-    if near.shaping.known_m is not None or sum(light.position_m is not None for light in lights) < LEAST_LIGHTS:
+    if near.shaping.known_m is not None or sum(light.position_m is not None for light in lights) < LIGHTS_FOR_SWEEPING:
         return near
     rows, cols = near.ground.depth_m.shape
     fine = max(-(-max(rows, cols) // FINE_POINTS), 1)

@@ -15,8 +15,8 @@ from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses
 BESIDE = 2
 """Frames on either side of a break, or at an end, that may show some of what was before it and of what came after."""
 ODD, LEAST_ODD = 6.0, 0.03
-"""A frame there is odd whose loss is higher than usual by so many usual scatters, and by so much: a flash lights few of
-its rows."""
+"""A frame there is odd whose loss is higher than usual by this many usual scatters, and by this much: a flash lights
+few of its rows."""
 FEW = 6
 """Fewer frames than this between two breaks fit by chance."""
 

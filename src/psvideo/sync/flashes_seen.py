@@ -99,8 +99,8 @@ def flashes_seen(
 
 
 WITHIN = 1e-9
-"""A synced flash begins so much of the exposure after it and ends as much before: rounding puts none into two frames,
-of which the clip may lack the second."""
+"""A synced flash begins this share of the exposure after it and ends as much before: rounding puts none into two
+frames, of which the clip may lack the second."""
 
 
 def synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped: Sequence[DroppedFrames]) -> Timing:

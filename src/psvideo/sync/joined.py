@@ -21,7 +21,7 @@ CLEARLY = 0.5
 def named_alike(plan: Plan, chapters: Sequence[tuple[ClipFit, Order]]) -> list[tuple[ClipFit, Order]]:
     """Return the chapters' fits with the same light under the same name, and how the names are known.
 
-    A chapter whose own names are a guess takes those under which another one's brightnesses foretell its frames best.
+    A chapter whose own names are a guess takes those under which another one's brightnesses predict its frames best.
     """
     known = max(chapters, key=lambda one: (one[1] != "guess", len(one[0].rows.value)))
     named = [one if one is known or one[1] != "guess" else _named_after(plan, known[0], one[0]) for one in chapters]
@@ -30,7 +30,7 @@ def named_alike(plan: Plan, chapters: Sequence[tuple[ClipFit, Order]]) -> list[t
 
 
 def _named_after(plan: Plan, known: ClipFit, found: ClipFit) -> tuple[ClipFit, Order]:
-    """Return the fit under the names under which the known fit's brightnesses foretell it best; "marker" if clearly."""
+    """Return the fit under the names under which the known fit's brightnesses predict it best; "marker" if clearly."""
     if known.fit.beat.upward != found.fit.beat.upward or len(known.rows.place) != len(found.rows.place):
         return found, "guess"
     learnt, asked = (replace(one.rows.one_window().binned(TURN_ROWS), doubt=None) for one in (known, found))

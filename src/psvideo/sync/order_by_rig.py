@@ -32,7 +32,7 @@ CLEARLY = 3.5
 MOST_LEFT = 0.1
 """The share of a pixel's light that may stay unexplained, as its median: gloss, interreflection, movement."""
 LIT, CLEAR_OF_CLIPPING = 0.05, SATURATED - SMALL_PLATE_MARGIN
-"""Pixels count that every flash lights at least so much of the brightest one, and none brings near saturation."""
+"""Pixels count that every flash lights at least this share of the brightest one, and none brings near saturation."""
 LEAST_PIXELS, MOST_PIXELS = 50, 1500
 KEPT = 0.8
 """The share of pixels, those that fit best, by which a turn is judged: the others may lie in shadow or be glossy."""

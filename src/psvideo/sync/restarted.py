@@ -1,6 +1,6 @@
 """A clip in which the strobe started again, or stopped: every part between is found as a clip by itself.
 
-Where parts are cut is known roughly at first, by frames that no longer fit. Once a part is found, its strobe foretells
+Where parts are cut is known roughly at first, by frames that no longer fit. Once a part is found, its strobe predicts
 the frames beyond its ends, which shows where the cut belongs, and which frames beside it fit on either side.
 """
 
@@ -22,13 +22,13 @@ from psvideo.sync.verdict.refusal import nothing_to_find
 RECUTS = 2
 """How often parts are cut again."""
 BESIDE = 2
-"""Parts are cut again where the strobe of one foretells this many frames of the next."""
+"""Parts are cut again where the strobe of one predicts this many frames of the next."""
 MOST_TIMED = 0.5
 """A clip in parts is timed where this share of its frames lies in parts in which the strobe is found,"""
 MIXED = 6
-"""A hole in so many of a part's frames beside a cut is none: they may show either strobe, or some of both."""
+"""A hole in this many of a part's frames beside a cut is none: they may show either strobe, or some of both."""
 BEYOND_DOUBT = 0.9
-"""or where the strobe takes away so much of these parts' robust loss, and leaves nothing to doubt in the plan."""
+"""or where the strobe takes away this share of these parts' robust loss, and leaves nothing to doubt in the plan."""
 
 Part = tuple[slice, ClipFit | None]
 """A stretch of frames, and its fit where the strobe is found in it."""
@@ -103,7 +103,7 @@ def _between_holes(rows: Profiles, cut: slice, found: ClipFit) -> slice:
 
 
 def recut(plan: Plan, rows: Profiles, parts: Sequence[Part]) -> list[slice]:
-    """Return the parts' frames with each cut moved to where the strobe of the part before no longer foretells the
+    """Return the parts' frames with each cut moved to where the strobe of the part before no longer predicts the
     picture, or that of the part after begins to. ``rows`` are all of the clip's."""
     at = [cut.start for cut, _ in parts[1:]]
     for n, (one, other) in enumerate(pairwise(parts)):
@@ -118,7 +118,7 @@ def recut(plan: Plan, rows: Profiles, parts: Sequence[Part]) -> list[slice]:
 
 
 def _foretold(plan: Plan, rows: Profiles, part: Part, *, sign: int) -> int:
-    """Return how many frames beyond a part's end, or before its beginning, its strobe foretells; 0 without one."""
+    """Return how many frames beyond a part's end, or before its beginning, its strobe predicts; 0 without one."""
     cut, found = part
     return reach(plan, rows, found, cut, sign=sign) if found else 0
 

@@ -29,7 +29,7 @@ NEAR, HALF = 0.25, 0.5
 the second it is nearer to another one, even where the clips share flashes in this one only."""
 
 SAME_S = 1e-9
-"""Dark times that were computed may differ by so much and be the same."""
+"""Dark times that were computed may differ by this much and be the same."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ MOST_AGAINST = 0.1
 MIXED_WELL, MIXED_BADLY = 0.1, 4.0
 """Powers decide the turn where one leaves less than this of the brightnesses, and all others that many times more."""
 TAKES_AWAY = 0.1
-"""A light that seems to take so much light away, as a share of what the strongest gives, bears a wrong name."""
+"""A light that seems to take this much light away, as a share of what the strongest gives, bears a wrong name."""
 
 
 @dataclass(frozen=True, kw_only=True)

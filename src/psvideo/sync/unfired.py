@@ -28,7 +28,7 @@ PART_FRAMES = 512
 """Frames over which a light's brightnesses are taken to be the same, but for one gain a flash."""
 TURNS = 4
 TOUCHED = 4
-"""A flash is looked for in so many frames from the first that may see any of it."""
+"""A flash is looked for in this many frames from the first that may see any of it."""
 NONE = 0.2
 """A flash that gives less than this share of what its light gives elsewhere, as the flashes around it do, has not
 fired."""
@@ -37,7 +37,7 @@ AROUND = 3
 GOES_ON = 0.5
 """they do where they give this share of their own light."""
 SEEN = 0.2
-"""Rows must have seen so much of a flash, as a share of its squared light, to tell whether it fired."""
+"""Rows must have seen this much of a flash, as a share of its squared light, to show whether it fired."""
 SURE = 4.0
 """Standard errors by which a gain, and usual scatters by which a flash, must lie below what one that fired shows."""
 FAINT = 0.01

@@ -44,7 +44,7 @@ REFLECTANCES = (1.0, 0.85, 0.7, 0.5)
 EDGED = 0.6
 """Chance that a ball mirrors an edge of the room just inside its rim, on one spoke: rooms have ceilings and floors."""
 TELLING = 12
-"""All spokes count as this many where they tell the reflectance: what misleads one misleads its neighbours."""
+"""All spokes count as this many where they decide the reflectance: what misleads one misleads its neighbours."""
 EDGES = 40
 """An edge within the rim is tried at this many places, or at every half pixel where those are fewer."""
 LEAST_NOISE = 0.01
@@ -117,7 +117,7 @@ def log_likelihood(
         number = np.maximum(np.isfinite(edged).sum(axis=2), 1)
         some_edge = np.logaddexp.reduce(-0.5 * worth * edged - cost, axis=2) - np.log(number)
         by_reflectance.append(np.logaddexp(np.log(1 - EDGED) - 0.5 * worth * plain, np.log(EDGED) + some_edge))
-    # one ball has one reflectance, and its spokes together tell which, as so many independent ones
+    # one ball has one reflectance, and its spokes together decide it, as this many independent ones
     speaks = np.array([np.logaddexp.reduce(one, axis=1).mean() * TELLING for one in by_reflectance])
     total: FloatArray = np.logaddexp.reduce(np.array(by_reflectance) + (speaks - speaks.max())[:, None, None], axis=0)
     return total

@@ -16,14 +16,14 @@ TERMINAL = "-"
 """The name that asks for the diagram as text."""
 
 
-def check_diagram_name(name: str | None, *, option: str = "`diagram`") -> Path | None:
+def check_diagram_name(name: str | None) -> Path | None:
     """Return the picture file that a name means, None for text or nothing; raises UsageError for other kinds."""
     if name is None or name == TERMINAL:
         return None
     path = Path(name)
     if path.suffix.lower() not in (".svg", ".png"):
         raise UsageError(
-            f"{option} {name!r} is not a kind of picture that can be drawn. Name a .svg or .png file, or -."
+            f"`diagram` {name!r} is not a kind of picture that can be drawn. Name a .svg or .png file, or -."
         )
     return path
 

@@ -12,13 +12,13 @@ MARKS = "123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 PARITY = "░▒"
 
 
-def timing_text(plan: Plan, *, width: int = 80, phase_s: float | None = None) -> Text:
+def timing_text(plan: Plan, *, width: int = 80) -> Text:
     """Return the diagram of a plan for a terminal: rows downwards, time to the right.
 
     Frames alternate between two shades where a row saw all of a flash; a flash is a band of its light's digit, ``:``
     are rows that saw a part of one, ``·`` none, ``━`` is the dark row, blank the time in which a row is blind.
     """
-    line = timeline(plan, phase_s=phase_s)
+    line = timeline(plan)
     columns = max(width - GUTTER - 1, 20)
     text = Text()
     for number in range(LINES):

@@ -50,9 +50,9 @@ class Drawing:
     shapes: tuple[Polygon | Label, ...]
 
 
-def timing_diagram(plan: Plan, *, phase_s: float | None = None, frames: int | None = None) -> Drawing:
+def timing_diagram(plan: Plan) -> Drawing:
     """Return the timing diagram of a plan, like the paper's figure 4: rows downwards, time to the right."""
-    line = timeline(plan, phase_s=phase_s, frames=frames)
+    line = timeline(plan)
     shapes: list[Polygon | Label] = [Polygon(points=_box(0, 0, WIDTH, HEIGHT), fill="#ffffff")]
     for frame in line.frames:
         shapes += _frame_fill(line, frame)

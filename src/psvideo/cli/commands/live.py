@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from psvideo.live.status import LiveStatus
 
 STAYS_S = 10.0
-"""Where lines are not written over, one comes so often as long as nothing changes."""
+"""Where lines are not written over, one comes this often as long as nothing changes."""
 
 
 @spread

@@ -32,7 +32,7 @@ RigPath = Annotated[
 ]
 OrderRig = Annotated[
     Path | None,
-    typer.Option("--rig", help="Where the lights are: tells which is which where the plan has no marker."),
+    typer.Option("--rig", help="Where the lights are: shows which light is which where the plan has no marker."),
 ]
 TimingPath = Annotated[
     Path | None, typer.Option("--timing", help="timing.json of this clip; left out: found from the picture.")

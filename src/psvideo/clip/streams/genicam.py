@@ -30,7 +30,7 @@ from psvideo.model.camera import Camera
 SCHEME = "genicam"
 BITS = re.compile(r"(?:Mono|RGB|BGR|Bayer[A-Z]{2})(\d+)")
 AGAIN_S = 1.0
-"""A camera that was lost is looked for again after so long."""
+"""A camera that was lost is looked for again after this long."""
 GIVES_UP_S = 60.0
 """And no longer than this."""
 LONGEST_NUMBER = 65_535

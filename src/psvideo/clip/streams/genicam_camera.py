@@ -17,7 +17,7 @@ HEAD = struct.Struct("<QQQ")
 WHERE = re.compile(r" : \w+Exception ")
 """Behind a fault's words stands where in the runtime's sources it was thrown."""
 WAIT_MS = 5000
-"""A camera from which nothing comes for so long has stopped."""
+"""A camera from which nothing comes for this long has stopped."""
 
 
 def cameras() -> list[dict[str, str]]:

@@ -17,9 +17,9 @@ from psvideo.model.camera import Camera
 LOOK_S = 0.004
 """Between two looks into the folder."""
 WHOLE_S = 2.0
-"""A file that cannot be decoded for so long is damaged, and not merely still being written."""
+"""A file that cannot be decoded for this long is damaged, and not merely still being written."""
 QUIET_S = 10.0
-"""After so long without a new frame the recorder has ended."""
+"""After this long without a new frame the recorder has ended."""
 
 
 def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> Iterator[Frame]:

@@ -25,7 +25,7 @@ from psvideo.model.units import counted
 
 STANDARD_INPUT = "-"
 OPEN_S = 20.0
-"""A stream that has not begun after so long is not there."""
+"""A stream that has not begun after this long is taken for missing."""
 LEAP_S = 5.0
 """Stamps that leap by more are another stream's."""
 JUDGED = 24

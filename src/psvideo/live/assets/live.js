@@ -90,7 +90,7 @@ function labelled(text, left, top) {
   return { kind: "span", text, name: "", style: `left: ${left}px; top: ${top}px` };
 }
 
-// Have just these marks over the picture; what stays as it was is not touched, as browsers lay out and paint anew what is.
+// Show exactly these marks; unchanged ones stay, because browsers lay out and repaint what is replaced.
 function putMarks(marks) {
   const box = at("labels");
   while (box.children.length > marks.length) box.lastChild.remove();

@@ -1,7 +1,7 @@
-"""The strobe's clock, followed frame by frame from a lock on: foretold, held against what came, corrected.
+"""The strobe's clock, followed frame by frame from a lock on: predicted, held against what came, corrected.
 
 The model is the finder's own (``sync.rowfit``): the brightness of every row under every light is fitted to the latest
-frames, and what is left of them moves the clock. A frame that was not foretold is looked at more closely: frames went
+frames, and what is left of them moves the clock. A frame that was not predicted is looked at more closely: frames went
 missing before it, or the light changed; where nothing explains it, the lock is lost, and said to be.
 """
 
@@ -31,7 +31,7 @@ State = Literal["seeking", "locked", "unsure", "lost"]
 EVERY = 8
 """Frames between two corrections of the clock."""
 LOOKED = 3
-"""Frames that were not foretold until others are taken for missing before them."""
+"""Frames that were not predicted until others are taken for missing before them."""
 LATEST = 24
 """Frames by which it is judged whether the strobe is still seen."""
 LEFT, LEFT_AFTER_CHANGE, SLOWLY = 0.6, 0.85, 8
@@ -113,7 +113,7 @@ class Follower:
         return self.window.frames[-1].index
 
     def _hold_against_foretold(self, index: int) -> None:
-        """Look for missing frames where the latest were not foretold, and else take the light for changed."""
+        """Look for missing frames where the latest were not predicted, and else take the light for changed."""
         latest = self.window.profiles(1)
         if self._losses(latest)[0] < self._usual + SUSPICIOUS:
             self._odd = self._odd[-LOOKED:] if self._odd and latest.index[0] - self._odd[-1] < LOOKED else []
@@ -135,7 +135,7 @@ class Follower:
             self.state = "unsure"
 
     def _missing(self, frames: Profiles) -> int:
-        """Return how many frames are missing before some that were not foretold, 0 where that explains nothing."""
+        """Return how many frames are missing before some that were not predicted, 0 where that explains nothing."""
         tried = [replace(frames, index=frames.index + extra) for extra in range(MOST + 1)]
         losses = np.array([self._losses(one).mean() for one in tried])
         best = int((losses + STEP_COST * np.arange(len(losses))).argmin())

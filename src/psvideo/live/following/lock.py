@@ -20,7 +20,7 @@ LONGEST_S = 2.0
 LOCK_ROWS = 180
 """A sixth of 1080, which gives the phase to 0.02 of theirs; more where a flash would not span ``FLASH_ROWS``."""
 SLOPE_S = 0.2
-"""Over so long before its end a bent clock's rate is read."""
+"""A bent clock's rate is read over this long before its end."""
 UNSURE = 3.0
 """The finder's errors hold for the whole stretch; at its ends, from where the clock is followed, it may be so much less
 sure."""

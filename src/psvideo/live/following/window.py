@@ -97,7 +97,7 @@ class Window:
 
 
 def window_of(plan: Plan, beat: Beat) -> Window:
-    """Return an empty window that holds what foretells the next frames: every light several times, and the marker."""
+    """Return an empty window that holds what predicts the next frames: every light several times, and the marker."""
     period_s = plan.camera.frame_period_s
     shortest_s = plan.shortest_flash_s
     sharp = int(FLASH_ROWS * beat.row_time_s * plan.camera.height_px / shortest_s)

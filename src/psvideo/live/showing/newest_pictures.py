@@ -20,7 +20,7 @@ from psvideo.page.picture import Look, PagePicture, halves, picked, picture_bloc
 
 LARGE, SMALL = Look(width_px=640), Look(width_px=320, quick=True)
 BRIGHT = 0.8
-"""The brightest hundredth of a picture is shown at so much of white."""
+"""The brightest hundredth of a picture is shown at this share of white."""
 REMEMBERED = 64
 """Results of which it is known when they came, and drawn pictures that are counted."""
 LIT = 0.5

@@ -29,7 +29,7 @@ SOCKET = "/newest"
 BALL = "ball"
 """What a page says for a click on the button that finds lights."""
 WAIT_S = 1.0
-"""A viewer who has seen the newest hears how things stand after so long."""
+"""A viewer who has seen the newest hears how things stand after this long."""
 LOCAL = (ADDRESS, "localhost")
 LIVE_PORT = 8788
 Told = Callable[[], Mapping[str, object]]

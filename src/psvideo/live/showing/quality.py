@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 MOST_AGE_S = 0.2
-"""From the end of an exposure to the picture it may take so long."""
+"""From the end of an exposure to the picture it may take this long."""
 LEAST_RATE = 15.0
 """Results a second that look like motion; fewer are enough only where the strobe's rounds come more slowly."""
 MOST_RATE = 17.0
 """More results a second nobody sees: they would only take time from frames and pages."""
 MOST_BEHIND_S = 0.1
-"""Frames that are fetched so much later than they were wait somewhere, and cameras have room for half a second."""
+"""Frames that are fetched this much later than they were wait somewhere, and cameras have room for half a second."""
 MOST_BUSY, SPARE_BUSY = 0.9, 0.65
 """Share of the time that making results may take; and that it would take at the next larger size, for that to be
 tried. Between them lies what the guess may be wrong by."""

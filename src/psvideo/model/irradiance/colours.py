@@ -23,7 +23,7 @@ from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix
 from psvideo.model.rig import Light, Rig, Vector, intensities
 
 CHANNELS = 3
-MAX_CONDITION = 20.0
+MOST_COLOUR_CONDITION = 20.0
 """Colours that are told apart by less raise noise more than lights that nearly lie in one plane may."""
 ONE_PLACE_DEG, ONE_PLACE_M = 2.0, 0.03
 """The LEDs of one lamp are a few millimetres apart, and each is measured to a degree or so."""
@@ -83,7 +83,7 @@ def unmixing_of(plan: Plan, rig: Rig, *, channels: int) -> Unmixing | None:
     lamps = _lamps(lights)
     by_lamp = np.stack([seen[:, list(lamp)].sum(axis=1) for lamp in lamps], axis=1)
     condition = max(condition_of(by_lamp[..., channel]) for channel in range(CHANNELS))
-    if condition <= MAX_CONDITION:
+    if condition <= MOST_COLOUR_CONDITION:
         return _exchanged(plan, rig, lamps, by_lamp, condition)
     return _one_by_one(plan, rig, seen, condition)
 
@@ -186,7 +186,7 @@ def _one_by_one(plan: Plan, rig: Rig, seen: FloatArray, condition: float) -> Unm
 def _one_flash(seen: FloatArray) -> OneFlash | None:
     """Return what a flash of these lights (light, channel) shows by itself, None where that is too little."""
     lit = np.flatnonzero(seen.any(axis=1))
-    if len(lit) > CHANNELS or colour_condition(seen[lit]) > MAX_CONDITION:
+    if len(lit) > CHANNELS or colour_condition(seen[lit]) > MOST_COLOUR_CONDITION:
         return None
     return OneFlash(lights=tuple(int(place) for place in lit), inverse=np.linalg.pinv(seen[lit].T).astype(np.float64))
 
@@ -199,8 +199,8 @@ def _inseparable(plan: Plan, slot: int, seen: FloatArray, between: float) -> Psv
     else:
         one, other = most_alike(seen[lit])
         what = (
-            f"the condition number of their colours is {colour_condition(seen[lit]):.3g} (at most {MAX_CONDITION:g} is "
-            f"accepted), and those of {names[one]} and {names[other]} are most alike"
+            f"the condition number of their colours is {colour_condition(seen[lit]):.3g} (at most "
+            f"{MOST_COLOUR_CONDITION:g} is accepted), and those of {names[one]} and {names[other]} are most alike"
         )
     return PsvideoError(
         f"Flash {slot + 1} of the plan lights {', '.join(names)} together, and their colours cannot be separated: "

@@ -19,7 +19,7 @@ SMALL_PLATE_MARGIN = 0.048
 """A small plate's pixel is a mean that may hide brighter ones: what is measured there stays this much further away."""
 
 
-def at_saturation(image: NDArray[np.floating[Any]], saturation: float = 1.0) -> NDArray[np.bool_]:
+def at_saturation(image: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
     """Return where a plate that may have been scaled is clipped, of the image's shape."""
-    clipped: NDArray[np.bool_] = image >= saturation * (1 - ROUNDING)
+    clipped: NDArray[np.bool_] = image >= 1 - ROUNDING
     return clipped

@@ -2,8 +2,9 @@
 
 Row i of frame n is open over ``[a, a + exposure)`` and flash k is on over ``[s, s + d)``, both on the camera's clock.
 The weight is the share of the flash's light that the row collected: 1 where it saw all of it, 0 where it saw nothing.
-Against a square flash's start it is a trapezoid; an LED that rises and falls slowly rounds it. This is the one model
-that finding the timing and rebuilding the plates share.
+Against a square flash's start it is a trapezoid; an LED that rises and falls slowly rounds it. Plates are
+made by it. The fit has the same model compiled (``sync/rowfit/row_model``); ``tests/test_sync.py`` holds the two
+together.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from psvideo.model.camera import Camera, FloatArray
 
 IntArray = NDArray[np.int64]
 REACH = 9.0
-"""After this many fall times a flash is over: e^-9 of its last light is left, a ten-thousandth."""
+"""After this many fall times a flash counts as over: e^-9 of its last light is left, a ten-thousandth."""
 
 
 @dataclass(frozen=True, kw_only=True)

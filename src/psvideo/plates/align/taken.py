@@ -34,7 +34,7 @@ SHADED = 0.25
 TURNED = 40.0
 """What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
 BLENDED, BLENDED_UNLIKE, BLENDED_ALIKE = np.float32(0.25), np.float32(0.8), np.float32(0.5)
-"""Shading turns evenly: by what it differs between two plates, their blend is off so much less than the nearer one
+"""Shading turns evenly: by what it differs between two plates, their blend is off this much less than the nearer one
 would be; by what their detail differs, by a shadow, or by more than is even, only a little less, and half where plates
 are alike: edges lie a part of a pixel beside each other there."""
 REST = 3.0
@@ -49,7 +49,7 @@ FEWEST = 3
 """This many sure ones make a normal without the others. Fewer leave a hole, and what is filled in there was off by 36
 degrees where the plates as they are were off by 19 (a bust that tumbles by 8 px from flash to flash)."""
 APART_PX = 1.0
-"""What moves by so much more or less from plate to plate moves by itself, and may hide other things."""
+"""What moves by this much more or less from plate to plate moves by itself, and may hide other things."""
 HALF, LEAST = np.float32(0.5), np.float32(1e-6)
 
 
@@ -69,8 +69,8 @@ class Taken:
 def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
     """Return what every pixel of a light's plate is taken from, on the velocities' grid.
 
-    ``guessed``: nothing is measured in it, and what changes as no motion explains is blended by time: somewhen between
-    the two plates it became what the later one shows, and of all guesses that is the least off.
+    ``guessed``: nothing is measured in it, and what changes as no motion explains is blended by time: at some time
+    between the two plates it became what the later one shows, and of all guesses that is the least off.
     """
     one, other = comparable(pair.before, pair.after)
     spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s

@@ -23,7 +23,7 @@ from psvideo.plates.mixing.mixture_arrays import Floats, MixtureArrays, Places, 
 NOTHING, WHOLE, CLIPPED = range(3)
 
 COUNTS = np.float32(0.02)
-"""A clipped sample clips the plate where so much of it counts; less is a neighbour's tail that is taken off."""
+"""A clipped sample clips the plate where this much of it counts; less is a neighbour's tail that is taken off."""
 
 
 @FUSED.kept

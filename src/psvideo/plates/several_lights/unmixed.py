@@ -101,7 +101,7 @@ def unmixed(one: Round, how: Unmixing) -> Round:
     plates = tuple(flashes.together(how, how.shares))
     unsure = None if one.unsure is None else _unsure_together(one.unsure, how.shares)
     apart_round = replace(one, plates=plates, unsure=unsure)
-    return flashes.mended(apart_round, how) if how.alone else apart_round
+    return flashes.corrected(apart_round, how) if how.alone else apart_round
 
 
 def _unsure_together(unsure: Image, shares: FloatArray) -> Image:
@@ -161,7 +161,7 @@ class _Flashes:
             plates.append(self._like(place, how.shown.lights[shown], image, own.seen, most))
         return plates
 
-    def mended(self, one: Round, how: Unmixing) -> Round:
+    def corrected(self, one: Round, how: Unmixing) -> Round:
         """Return a round of lamps, where its flashes contradict each other, out of the nearest flash alone."""
         products = np.stack([plate.image for plate in one.plates])
         wrong = self._moved() & (contradicted(products) | ~one.plates[0].seen)
@@ -173,12 +173,12 @@ class _Flashes:
             given = np.array(how.surface_colour, np.float32)
             colour, sure = given / given.max(), wrong
         alone = {plate.light: plate for plate in self.alone(self.nearest, how, colour)}
-        mended = tuple(_within(plate, alone[plate.light], wrong) for plate in one.plates)
+        corrected = tuple(_within(plate, alone[plate.light], wrong) for plate in one.plates)
         unsure = one.unsure
         if unsure is not None:
             small = cv2.resize(wrong.astype(np.float32), unsure.shape[:0:-1], interpolation=cv2.INTER_AREA)
             unsure = unsure + small * (_unsure_alone(self.one, self.nearest, how) - unsure)
-        return replace(one, plates=mended, doubtful=wrong & ~sure, unsure=unsure)
+        return replace(one, plates=corrected, doubtful=wrong & ~sure, unsure=unsure)
 
     def _moved(self) -> Flags:
         stood, (rows, cols) = self.one.stood, self.images[0].shape[:2]

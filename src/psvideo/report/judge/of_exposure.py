@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.units import listed
-from psvideo.report.judge.of_lamps import LEAST_LIGHTS, NAMED
+from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
 from psvideo.report.observe.observed import Observed

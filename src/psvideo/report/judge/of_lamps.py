@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.marker import NOT_FIRING
+from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.units import listed
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
@@ -14,8 +15,6 @@ from psvideo.report.observe.observed import Observed
 
 WEAK_LIGHT = 1 / 8
 """Of the brightest lamp's light."""
-LEAST_LIGHTS = 3
-"""Where this many others fire, one that does not is missed by what they do not reach; shadow and it look the same."""
 CHECKED_FROM = 5
 """With fewer lights than these nothing shows that one of them gives less than the rig says, and all normals lean."""
 MISSED = 0.5

@@ -18,12 +18,12 @@ MOST_UNSEEN, LOST_UNSEEN = 0.02, 0.3
 BLIND = 0.97
 """A camera whose exposure is a smaller share of its frame misses flashes while the shutter is closed."""
 NAMED = 3
-"""So many places of missing frames are named."""
+"""At most this many places of missing frames are named."""
 
 
 def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | None = None) -> Iterator[Judgement]:
     """Judge which rows were seen by nobody, or under two flashes, and why. ``take_s`` is how long the take lasts of
-    which only a part was looked at: the rest shows more rows below 360 degrees, and tells the ambient light of rows
+    which only a part was looked at: the rest shows more rows below 360 degrees, and shows the ambient light of rows
     where there is no dark slot."""
     unseen = max((one.unseen_share for one in observed.facts), default=0.0)
     borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
@@ -32,7 +32,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
         unseen, borrowed = min(unseen, never), min(borrowed + unseen, 1.0)
     without_dark = not (plan.mode == "synced" or _is_blind(timing) or any(flash.is_dark for flash in plan.flashes))
     if take_s is not None and without_dark:
-        unseen = 0.0  # more frames tell the ambient light of more rows
+        unseen = 0.0  # more frames show the ambient light of more rows
     said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
     holes = list(_dropped(timing, observed))
     explained = bool(said) or (bool(timing.dropped_frames) and unseen <= LOST_UNSEEN)

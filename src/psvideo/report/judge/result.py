@@ -9,6 +9,7 @@ from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.steadiness import Change
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
 SOFT_PX = 1.5
 """Sharpest edges that are softer are never worse than doubtful: a smooth subject has no others."""
@@ -27,8 +28,6 @@ NOT_MATTE = 0.1
 HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
-ALL_EXPLAINED = 3
-"""This many lights leave no residual: a normal and an albedo explain three brightnesses exactly."""
 MOVING_FACTOR = 2.0
 """Where the picture moves, this many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2

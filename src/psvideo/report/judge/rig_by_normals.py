@@ -12,7 +12,7 @@ from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 
 ONE_SURFACE, BY_SHINING = 0.8, 0.2
-"""Slopes that agree by the first, and that no lean mends by more than the second, are one surface's. So the rig's
+"""Slopes that agree by the first, and that no lean removes by more than the second, are one surface's. So the rig's
 directions are right, and what shines explains the rest (a coin of metal under 6 to 24 lights: 0.83 to 0.97 and 0.01 to
 0.05; the same lights off by 10 degrees each: 0.91 and 0.24, by 20 degrees: 0.77 and 0.31)."""
 AGREE, DISAGREE = 0.3, -0.1
@@ -31,7 +31,7 @@ SURELY_LEANING = 0.5
 REST, EXACT_LIGHTS = 1 / 3, 3
 """A rig is turned as a whole, or a lens is shifted, where so little of the change is none; what is wrong of three
 lights is one change as well. More lights that are each wrong in a way of their own make normals that no such change
-mends."""
+removes."""
 MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
 rig as well, on photographs by 9 to 15 degrees."""

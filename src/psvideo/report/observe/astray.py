@@ -20,10 +20,10 @@ from psvideo.model.camera import FloatArray
 from psvideo.plates.light_plate import LightPlate
 from psvideo.report.observe.rig_and_curve.rigpoints import CHANNEL, RigPoints
 
-LEAST_LIGHTS = 5
+LIGHTS_FOR_ASTRAY = 5
 """Of four, one value a pixel is left over, which errors of many kinds explain."""
 MOST_LIGHTS = 24
-"""Of more pictures this many are compared, spread evenly over the list: they tell whether the camera stood."""
+"""Of more pictures this many are compared, spread evenly over the list: they show whether the camera stood."""
 PARTS, LEAST_PARTS, PART_PX = 4, 6, 160
 """Parts down and across the subject, how many must have something to say, and the pixels of each that are looked at."""
 FINE_PX, BROAD_PX = 1.0, 4.0
@@ -61,7 +61,7 @@ class Astray:
 
     @property
     def within_px(self) -> float:
-        """What they may lie apart at most, as far as parts of the picture tell."""
+        """What they may lie apart at most, as far as parts of the picture show."""
         return max(self.typical_px, self.error_px)
 
 
@@ -72,7 +72,7 @@ def astray(plates: Sequence[LightPlate], points: RigPoints, box: tuple[slice, sl
     that all of them reach.
     """
     lights = list(range(0, len(plates), -(-len(plates) // MOST_LIGHTS)))
-    if len(lights) < LEAST_LIGHTS:
+    if len(lights) < LIGHTS_FOR_ASTRAY:
         return None
     asked = [plates[light] for light in lights]
     found = [_places_px(asked, part, _vectors_at(points, part)[lights]) for part in _parts(box)]

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
+from psvideo.plates.align.velocity.flow import TOE, pixel_places
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.clipped_flashes import Filled, coarser, filled_of, vague_between
 
 WIDTH_PX = 480
-TOE = 0.02
 LEAST_CHANGE, NOISE_FACTOR = 1.5, 5.0
 """Blocks of 8 pixels moved where they changed by more codes than the first, and by the second times their noise."""
 LEAST_BLOCKS = 0.002
@@ -116,20 +116,14 @@ def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np
 
 def _explained(one: NDArray[np.float32], other: NDArray[np.float32], way: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Return where flow explains most of what two pictures differ by, or leaves no more than shading, (row, col)."""
-    x, y = _places(way)
+    x, y = pixel_places(*way.shape[:2])
     moved = cv2.remap(other, x + way[..., 0], y + way[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     left, change = (cv2.blur((picture - one) ** 2, (DETAIL_PX, DETAIL_PX)) for picture in (moved, other))
     return np.asarray(left < np.maximum(EXPLAINED**2 * change, SHADING_CODES**2))
 
 
-def _places(way: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    rows, cols = way.shape[:2]
-    x, y = np.meshgrid(np.arange(cols, dtype=np.float32), np.arange(rows, dtype=np.float32))
-    return x, y
-
-
 def _returns(forward: NDArray[np.float32], backward: NDArray[np.float32]) -> NDArray[np.bool_]:
-    x, y = _places(forward)
+    x, y = pixel_places(*forward.shape[:2])
     back = cv2.remap(backward, x + forward[..., 0], y + forward[..., 1], cv2.INTER_LINEAR)
     missed = np.hypot(*np.moveaxis(forward + back, -1, 0))
     return np.asarray(missed < RETURN_PX + 0.1 * np.hypot(forward[..., 0], forward[..., 1]))

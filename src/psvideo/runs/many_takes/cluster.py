@@ -18,7 +18,7 @@ EXTRA = (
     "solves everything, with all cores."
 )
 SILENT_S = 60
-"""A worker that is not heard of for so long is started again, and its work is given to another."""
+"""A worker that is not heard of for this long is started again, and its work is given to another."""
 SETTINGS = {"distributed.nanny.pre-spawn-environ": {}, "distributed.scheduler.worker-ttl": f"{SILENT_S}s"}
 """dask's own environment for workers sets MALLOC_TRIM_THRESHOLD_, which halves the speed of numpy."""
 ADDRESS = re.compile(r"([a-z]+://)?[^/]+:\d+/?|inproc://.+|[a-z]+://.+:\d+/.*")

@@ -23,7 +23,7 @@ POINTS = 6000
 """This many pixels of every picture are looked at, evenly spread."""
 LEAST, MOST = 0.1, 0.97
 """Of a pixel's brightest light, and of saturation: between them a sample counts."""
-LEAST_LIGHTS = 4
+LIGHTS_FOR_CURVE = 4
 CODES, LEAST_STEEP = np.linspace(0, 1, 4097), 1e-3
 """Codes at which a curve's steepness is found, and the least that is believed: gamma curves begin level."""
 SUBJECT = 1 / 6
@@ -100,7 +100,7 @@ class Glance:
 
 
 def _enough(used: NDArray[np.bool_], brightest: FloatArray) -> NDArray[np.bool_]:
-    return np.asarray((used.sum(axis=0) >= LEAST_LIGHTS) & (brightest > SUBJECT * np.percentile(brightest, 99)))
+    return np.asarray((used.sum(axis=0) >= LIGHTS_FOR_CURVE) & (brightest > SUBJECT * np.percentile(brightest, 99)))
 
 
 def _residual(lit: FloatArray, directions: FloatArray, weights: FloatArray) -> FloatArray:
@@ -114,7 +114,7 @@ def _residual(lit: FloatArray, directions: FloatArray, weights: FloatArray) -> F
 def glance_at(pictures: Photographs, lights: Sequence[Light]) -> Glance | None:
     """Look at a few pixels of every picture; None where lights are near, or too few to check each other."""
     directions = [light.direction for light in lights if light.direction is not None]
-    if len(directions) < max(len(lights), LEAST_LIGHTS) or pictures.header.bits is None:
+    if len(directions) < max(len(lights), LIGHTS_FOR_CURVE) or pictures.header.bits is None:
         return None
     signals = [_thin(pictures, file) for file in pictures.files]
     green = [light.intensity[min(1, len(light.intensity) - 1)] for light in lights]

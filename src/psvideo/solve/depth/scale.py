@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import bands, kept_in, let_go
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
+from psvideo.model.irradiance.ground import FARTHEST_SHARE
 from psvideo.solve.depth.cao2022 import Height, Mask
 from psvideo.solve.depth.view import Box, View
 
@@ -27,8 +28,6 @@ LEAST_PART_PX = 64
 """Parts with fewer pixels get no depth: speckles, of which neither shape nor place is known."""
 LEAST_COMMON_SHARE = 0.2
 """A part takes the first instant's scale when at least this share of it was seen then."""
-FARTHEST_SHARE = 1e-3
-"""A plane that runs past the horizon is followed to a thousand times its nearest depth."""
 
 Plane = tuple[float, float, float, float]
 

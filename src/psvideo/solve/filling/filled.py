@@ -32,7 +32,7 @@ THIN = 4
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
 
 
-def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threads: int | None = None) -> Surface:
+def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float) -> Surface:
     """Return the surface with a normal and an albedo in every pixel of the subject; its memory is taken over.
 
     solved: (row, col), where the surface has a normal, trusted or not.
@@ -41,11 +41,11 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     The subject is what the mask allows; without one, what any light reaches, and small holes in it. What was solved
     stays to the bit. ``source`` says of every pixel how many lights its normal is from.
     """
-    wanted = _wanted(solved, one, threads)
+    wanted = _wanted(solved, one)
     where = _places(wanted)
     if not len(where):
         return replace(surface, source=_source(solved))
-    said = _said(one, wanted, len(where), noise, threads)
+    said = _said(one, wanted, len(where), noise)
     normals, albedo = _bits(np.moveaxis(surface.normals, -1, 0)), _bits(_channels(surface.albedo))
     tiles = tiles_around(wanted, solved, normals, albedo, reach_px=REACH_PX, spare=one.spare)
     del wanted
@@ -87,20 +87,20 @@ def _errors(surface: Surface, where: NDArray[np.int32], lights: Bytes, away: Flo
     return errors
 
 
-def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
+def _wanted(solved: Mask, one: Evidence) -> Mask:
     """Return the subject's pixels (row, col) that have no normal yet."""
     if one.mask is not None:
         return np.asarray(one.mask & ~solved)
     if solved.all():
         return np.zeros_like(solved)
-    lit = _lit(solved, one, threads)
+    lit = _lit(solved, one)
     around = cv2.boxFilter(lit, cv2.CV_8U, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
     subject = solved | ((lit > 0) & (around >= MOST_LIGHTS_AROUND))
     del lit, around
     return np.asarray((subject | holes_in(subject)) & ~solved)
 
 
-def _lit(solved: Mask, one: Evidence, threads: int | None) -> Bytes:
+def _lit(solved: Mask, one: Evidence) -> Bytes:
     """Return 1 where any light reaches a pixel or it is solved, else 0."""
     counts = np.zeros(solved.shape, np.uint8)
     asked = np.ascontiguousarray(~solved).view(np.uint8)
@@ -108,7 +108,7 @@ def _lit(solved: Mask, one: Evidence, threads: int | None) -> Bytes:
     def count(given: Task, work: Work, first: int, last: int) -> None:
         count_rows(given, work, asked, counts, first, last)
 
-    one.in_bands(count, threads, needed=np.asarray(~solved.all(axis=1)))
+    one.in_bands(count, None, needed=np.asarray(~solved.all(axis=1)))
     return ((counts > 0) | solved).view(np.uint8)
 
 
@@ -123,7 +123,7 @@ def holes_in(subject: Mask) -> Mask:
     return np.asarray(small[labels]) if count > 1 else np.zeros_like(subject)
 
 
-def _said(one: Evidence, wanted: Mask, pixels: int, noise: float, threads: int | None) -> Said:
+def _said(one: Evidence, wanted: Mask, pixels: int, noise: float) -> Said:
     said = said_for(pixels, noise)
     asked, counts = wanted.view(np.uint8), np.count_nonzero(wanted, axis=1)
     begins = np.cumsum(counts) - counts
@@ -131,7 +131,7 @@ def _said(one: Evidence, wanted: Mask, pixels: int, noise: float, threads: int |
     def look(given: Task, work: Work, first: int, last: int) -> None:
         look_rows(given, work, asked, begins, said, first, last)
 
-    one.in_bands(look, threads, needed=counts > 0)
+    one.in_bands(look, None, needed=counts > 0)
     return said
 
 

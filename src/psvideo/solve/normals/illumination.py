@@ -9,9 +9,10 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.near_light import NearField, is_near, middle_directions, near_field
-from psvideo.model.rig import Light, directions, intensities
+from psvideo.model.rig import LEAST_LIGHTS, Light, directions, intensities
 
-MAX_CONDITION = 20.0  # lights within about 3 degrees of one plane; a normal's error is the noise's times this
+MAX_CONDITION = 20.0
+"""Lights within about 3 degrees of one plane; a normal's error is the noise's times this."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +47,7 @@ def illumination(lights: Sequence[Light], *, channels: int, ground: Ground | Non
     could be trusted (condition number above MAX_CONDITION).
     """
     names = tuple(light.name for light in lights)
-    if len(lights) < 3:
+    if len(lights) < LEAST_LIGHTS:
         raise PsvideoError(
             f"Normals need at least three lights, and here are {len(lights)} ({', '.join(names) or 'none'}). "
             "Flash three or more lights that do not lie in one plane with the subject."

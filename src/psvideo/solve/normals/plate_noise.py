@@ -22,7 +22,7 @@ ROWS, SAMPLES = 24, 1 << 16
 """Noise is looked for in about this many rows of every plate, evenly spread, and this many samples of all: of small
 pictures in more rows."""
 LEVELS, LEAST_PIXELS, BRIGHT = 12, 512, 0.25
-"""What is brighter than such a share of the brightest level shows how noise grows with light."""
+"""What is brighter than this share of the brightest level shows how noise grows with light."""
 CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST = 1 << 12, 5, 1.25, 0.025
 """This many samples of a plate show whether it holds a file's codes: it then has few values, but at least LEAST_CODES,
 which most samples share, and half of the gaps between neighbouring ones are alike up to this factor. Codes of eight
@@ -128,7 +128,7 @@ def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) 
 
     In the dark single plates count, as far as a picture has any (``dark_share``): there is no paint, and noise of an
     ambient picture that was taken off all plates is alike in all of them, which a normal and an albedo explain. Where
-    levels are much alike, no line through them tells the dark: less than the share that is left of the single plates'
+    levels are much alike, no line through them shows the dark: less than the share that is left of the single plates'
     is not believed.
     """
     bright = at > BRIGHT * at.max()

@@ -15,7 +15,7 @@ from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.plate_noise import PlateNoise, noise_of
 from psvideo.solve.normals.robust import huber1981
-from psvideo.solve.normals.robust.reflectance import LEAST_LIGHTS
+from psvideo.solve.normals.robust.reflectance import LIGHTS_FOR_REFLECTANCE
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
@@ -60,7 +60,7 @@ class Solving:
 
     def looks_at_subject(self, lights: int) -> bool:
         """Return whether so many lights show what a subject reflects beyond n . l, to a solver that uses it."""
-        return lights >= LEAST_LIGHTS and self.method(lights) == "robust"
+        return lights >= LIGHTS_FOR_REFLECTANCE and self.method(lights) == "robust"
 
     def solve(
         self,

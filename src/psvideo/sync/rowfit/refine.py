@@ -65,8 +65,8 @@ def refine(
 ) -> Fit:
     """Fit shift and clock ratio, and the times named in ``free``, by steps that are taken only as far as they help."""
     beat, rest, weight, trust = _stepped(plan, rows, beat, free=free, steps=steps, first_scale=first_scale)
-    basis, unit_s = _straight(rows, free), _units(plan, rows, beat, free)
-    covariance = believable(plan, rows, beat, weight, trust, basis, prior(plan, rows, unit_s, free))
+    basis, unit_s = _straight(rows, free), _units(plan, rows, free)
+    covariance = believable(plan, rows, beat, weight, trust, basis, prior(unit_s, free))
     return Fit(
         beat=beat,
         rest=rest,
@@ -93,7 +93,7 @@ def refined_beat(
 def _stepped(
     plan: Plan, rows: Profiles, beat: Beat, *, free: tuple[str, ...], steps: int, first_scale: float
 ) -> _Stepped:
-    basis, unit_s = _straight(rows, free), _units(plan, rows, beat, free)
+    basis, unit_s = _straight(rows, free), _units(plan, rows, free)
     rest = unexplained(plan, rows, beat)
     weight = trust = np.ones_like(rest)
     for step in range(steps):
@@ -101,8 +101,8 @@ def _stepped(
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
         rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
-        move = solved(hessian + prior(plan, rows, unit_s, free), scores.sum(axis=0))
-        beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
+        move = solved(hessian + prior(unit_s, free), scores.sum(axis=0))
+        beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
             break
     return _Stepped(beat, rest, weight, trust)
@@ -138,7 +138,7 @@ def _gains(
     for name in names:
         kept = [*range(2 + len(free)), 2 + every.index(name)]
         part, pulls = hessian[np.ix_(kept, kept)], scores[:, kept]
-        known = prior(plan, rows, _units(plan, rows, fit.beat, (*free, name)), (*free, name))
+        known = prior(_units(plan, rows, (*free, name)), (*free, name))
         move = solved(part + known, pulls.sum(axis=0))
         gain = float(move @ part @ move)
         if gain > at_least and _may_move(rows, fit.beat, name, float(move[-1])):
@@ -170,13 +170,13 @@ def _pivot(rows: Profiles) -> tuple[float, float]:
     return float(start_s.mean()), max(float(start_s[-1] - start_s[0]) / 2, rows.period_s)
 
 
-def _units(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> FloatArray:
+def _units(plan: Plan, rows: Profiles, free: tuple[str, ...]) -> FloatArray:
     """Return a fiftieth of a flash in every unknown, which is small for all of them."""
     shortest_s = 0.02 * plan.shortest_flash_s
     return np.array([shortest_s] * 2 + [shortest_s / (rows.place.max() if n == "row_time_s" else 1.0) for n in free])
 
 
-def prior(plan: Plan, rows: Profiles, unit_s: FloatArray, free: tuple[str, ...]) -> FloatArray:
+def prior(unit_s: FloatArray, free: tuple[str, ...]) -> FloatArray:
     """Return the precision of what is known beforehand: free times stay within a few flashes of where they are."""
     known = np.zeros((len(unit_s), len(unit_s)))
     for n in range(len(free)):
@@ -184,7 +184,7 @@ def prior(plan: Plan, rows: Profiles, unit_s: FloatArray, free: tuple[str, ...])
     return known + 1e-12 * np.diag(unit_s**-2.0)
 
 
-def _held(plan: Plan, move: FloatArray, free: tuple[str, ...]) -> FloatArray:
+def _held(plan: Plan, move: FloatArray) -> FloatArray:
     """Take no step of more than a third of a flash."""
     longest_s = 0.33 * plan.shortest_flash_s
     largest_s = float(np.abs(move[:2]).max())

@@ -1,4 +1,4 @@
-"""Strobes that begin anew: from one frame to the next at another place in their cycle, as no missing frames explain.
+"""Restarts: between two frames the strobe jumps in its cycle, by a time that missing frames do not explain.
 
 A camera that drops frames moves time by whole frames; a strobe that is started again, skips a flash, or waits for one
 that was late moves by anything. What frames on both sides show tells the two apart, unless the strobe happens to move
@@ -29,11 +29,11 @@ from psvideo.sync.rowfit.tracking.track import FrameTrack, track
 from psvideo.sync.rowfit.unlit import still, unlit
 
 MOST_RESTARTS = 3
-"""A strobe that seems to begin anew more often than this is another plan's, or a subject that moves."""
+"""Where a strobe seems to restart more often than this, the plan is another one, or the subject moves."""
 LEAST_AFTER, AFTER = 8, 16
 """Frames after a restart that must show the new phase, and how many are asked."""
 PARTS, FINE_PARTS = 3, 24
-"""The new phase is looked for in steps of such a share of the shortest flash, first all over the cycle, then near."""
+"""The new phase is looked for in steps of this share of the shortest flash, first all over the cycle, then near."""
 WHOLE_FRAMES = 0.125
 """A move that is whole frames to within this share of the shortest flash is frames that are missing."""
 APART = 0.1
@@ -43,9 +43,9 @@ HALVES = 0.5
 TICKS = 1_000_000
 """Places in time between frames are counted in such parts of a frame."""
 MOSTLY = 0.8
-"""The strobe may have stopped where such a share of the frames after the first odd one are odd."""
+"""The strobe may have stopped where this share of the frames after the first odd one are odd."""
 ODD_RUN = 8
-"""A strobe may have begun anew where the median loss of so many frames in a row is odd."""
+"""The strobe may have restarted where the median loss of this many frames in a row is odd."""
 
 
 def may_restart(plan: Plan, rows: Profiles, found: ClipFit) -> bool:
@@ -155,8 +155,8 @@ def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, ext
     bridged = losses_of(plan, learnt, course, beat, light)[::sign]
     if float(np.median(went[first : first + AFTER])) > usual + SUSPICIOUS:
         anywhere = _least_losses(plan, learnt, rows.take(span).take(after).one_window(), beat, light)
-        foretold = float(np.median(anywhere)) < usual + SUSPICIOUS
-        return None if foretold else _lost(plan, rows, beat, ahead, sign, bridged > usual + SUSPICIOUS)
+        predicted = float(np.median(anywhere)) < usual + SUSPICIOUS
+        return None if predicted else _lost(plan, rows, beat, ahead, sign, bridged > usual + SUSPICIOUS)
     if _whole_frames(plan, rows, beat, shift_s):
         return None
     count = len(extra)
@@ -187,7 +187,7 @@ def _lost(plan: Plan, rows: Profiles, beat: Beat, ahead: slice, sign: int, odd: 
 
 
 def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> float:
-    """Return by how much frames must come later for known brightnesses to foretell them best, within one cycle."""
+    """Return by how much frames must come later for known brightnesses to predict them best, within one cycle."""
 
     def best_s(shifts_s: FloatArray) -> float:
         losses = [float(losses_of(plan, learnt, moved(rows, one), beat, light).sum()) for one in shifts_s.tolist()]
@@ -200,7 +200,7 @@ def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat,
 
 
 def _least_losses(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
-    """Return how badly known brightnesses foretell each frame at its best place in the cycle, shape (frame,)."""
+    """Return how badly known brightnesses predict each frame at its best place in the cycle, shape (frame,)."""
     shifts_s = np.arange(0.0, plan.cycle_s * beat.clock.rate, plan.shortest_flash_s / PARTS)
     losses = [losses_of(plan, learnt, moved(rows, one), beat, light) for one in shifts_s.tolist()]
     least: FloatArray = np.min(losses, axis=0)
@@ -230,9 +230,9 @@ def _beside_holes(plan: Plan, rows: Profiles, tracked: FrameTrack) -> int | None
 
 
 def _apart(plan: Plan, rows: Profiles, at: int, beat: Beat) -> bool:
-    """Return whether flashes from a frame on come clearly earlier or later than those before it foretell.
+    """Return whether flashes from a frame on come clearly earlier or later than those before it predict.
 
-    A few frames foretell badly, so that the clock is fitted to all frames again, with the move and without.
+    A few frames predict badly, so that the clock is fitted to all frames again, with the move and without.
     """
     rows = rows.one_window()
     near = refined_beat(plan, rows.take(slice(0, at)), beat, steps=4, first_scale=0.1)
@@ -259,7 +259,7 @@ def _apart(plan: Plan, rows: Profiles, at: int, beat: Beat) -> bool:
 
 
 def reach(plan: Plan, rows: Profiles, found: ClipFit, frames: slice, *, sign: int) -> int:
-    """Return how many frames beyond a chapter's end (``sign`` 1) or before its beginning (-1) its strobe foretells.
+    """Return how many frames beyond a chapter's end (``sign`` 1) or before its beginning (-1) its strobe predicts.
 
     ``frames`` are the chapter's among ``rows``, all of the clip's.
     """

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
+from psvideo.model.rows.shutter import REACH
 
 IntArray = NDArray[np.int64]
 
-REACH = 9.0
-"""After this many fall times a flash counts as over."""
 OVER = 40.0
 """After this many, double precision cannot tell that it is not."""
 LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL, BLUR = range(7)

@@ -9,7 +9,7 @@ from psvideo.sync.rowfit.normal_equations import projected, solved
 from psvideo.sync.rowfit.profiles import Profiles
 
 LEAST_STEEP = -0.1
-"""Cauchy's pull falls where residuals are large; of that so much counts, lest a few rule a short clip's errors."""
+"""Cauchy's pull falls where residuals are large; this share of that counts, lest a few rule a short clip's errors."""
 LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 CLUSTER, LEAST_CLUSTERS = 12, 8

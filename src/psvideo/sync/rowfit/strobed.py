@@ -1,6 +1,6 @@
 """Whether frames show the plan's strobe at all, at any place in its cycle, or another picture.
 
-A subject that moves spoils what brightnesses foretell, but not where flashes split the rows: under the strobe one
+A subject that moves spoils what brightnesses predict, but not where flashes split the rows: under the strobe one
 phase leaves clearly less than others do, with brightnesses fitted to the very frames that are asked. Without a strobe
 all phases leave alike, and as much as chance lets them.
 """

@@ -19,7 +19,7 @@ on an average: as much as noise on either side comes to. What lies below is no l
 STRAY = 0.5
 """Darker frames, up to this share of the shortest run that is looked for, make no floor."""
 REPEATED_LEAST = 2
-"""A frame in the dark may be shown so often where no lit one is."""
+"""A frame in the dark may be shown this often where no lit one is."""
 VARIES = 0.03
 """Rows whose spread is below this share of the largest show nothing of the strobe."""
 ROWS = 60

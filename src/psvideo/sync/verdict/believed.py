@@ -31,11 +31,11 @@ LUCK = 0.25
 LOST = 0.5
 """Times whose standard error is more than this share of the shortest flash are not found."""
 UNSURE_GAIN, UNSURE = 0.7, 0.1
-"""A fit that takes less of the robust loss away, or is unsure by such a share of a flash, is worth a second look."""
+"""A fit that takes less of the robust loss away, or is unsure by this share of a flash, is worth a second look."""
 MOVED = 0.05
 """So is one that had to move the exposure or the readout by more than this share."""
 STILL = 0.9
-"""A shutter other than the plan's is believed where it takes away so much of the robust loss, as it does unless the
+"""A shutter other than the plan's is believed where it takes away this share of the robust loss, as it does unless the
 subject moves."""
 GAPPED = 0.8
 """A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""

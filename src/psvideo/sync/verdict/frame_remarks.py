@@ -11,7 +11,7 @@ from psvideo.sync.rowfit.coarse.retime import regular_step
 from psvideo.sync.rowfit.fit import ClipFit
 
 MANY = 4
-"""From so many frames missing in one place, a strobe that started again is as likely."""
+"""Where this many frames or more are missing in one place, a strobe that started again is as likely."""
 
 
 def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -> Iterator[str]:

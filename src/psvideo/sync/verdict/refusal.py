@@ -29,7 +29,7 @@ LITTLE_MORE = 2.0
 """Times the robust loss that more lights leave, which fewer may."""
 PERIOD_FRAMES, PERIOD_ROWS = 14, 8
 LEAST_GAP, LONGEST = 0.25, 2.5
-"""Periods are tried from so much of a frame's period after a flash to so many of them."""
+"""Periods are tried from this share of a frame's period after a flash to this many of them."""
 MOST_PERIODS = LONGEST - LEAST_GAP
 
 

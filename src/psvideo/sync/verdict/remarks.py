@@ -9,6 +9,7 @@ import numpy as np
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
+from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.units import show_seconds
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
@@ -22,7 +23,7 @@ CHANGED, GROSS = 1e-3, 0.08
 SURE = 5.0
 """Standard errors by which it must also be off to be called a mistake."""
 GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
-"""Exposure is called automatic where frames' gains differ by so much and explain such a share of what is left."""
+"""Exposure is called automatic where frames' gains differ by this much and explain this share of what is left."""
 GAIN_FRAMES = (9, 1)
 """Frames over which a gain is taken to be the same: exposures creep, and some jump."""
 DIM = 0.05
@@ -33,7 +34,6 @@ UNFIRED = 0.01
 """Share of the brightest light's level below which a light is said not to have fired."""
 ALIKE = 0.01
 """Share of their level by which lights that flash one at a time differ at least, in some rows."""
-LEAST_LIGHTS = 3
 UNSURE = 0.05
 """Share of a flash from which on a standard error is worth a word."""
 MUCH = 0.5

@@ -33,7 +33,7 @@ CLEARLY, BETTER = 0.5, 0.85
 """A rival is believed where it leaves less than this share of the robust loss that the plan leaves; the second, where
 the plan's own fit is out of the question and the rival's will be judged for itself."""
 FAIR, GOOD = 0.4, 0.7
-"""And where it takes away such a share of all of it itself; the second, where no fit will judge it."""
+"""And where it takes away this share of all of it itself; the second, where no fit will judge it."""
 
 Fault = Literal["shutter", "readout", "flashes", "rate", "count"]
 

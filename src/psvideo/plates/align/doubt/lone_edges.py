@@ -31,7 +31,7 @@ LEAST_LIT = 0.04
 FEWEST = 3
 """This many lights must show something of a pixel."""
 AROUND_SHARE = 1 / 8
-"""Edges speak for what lies within such a share of the picture's longer side."""
+"""Edges speak for what lies within this share of the picture's longer side."""
 USUAL, UNSURE = 0.01, 5.0
 """Edges speak where their mean step over all pixels around exceeds the first (subjects that are followed correctly,
 painted or bare: 0.009 on average); what is beyond it, times the second, is the share by which light may be off."""

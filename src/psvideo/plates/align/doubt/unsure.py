@@ -14,7 +14,7 @@ from psvideo.plates.align.velocity.followed import Followed, Pair, odd_width
 WINDOW_PX = 3
 """Plates are compared over this many pixels of their sketches: edges that come to lie beside each other are narrow."""
 UNKNOWN = np.float32(1e4)
-"""What nobody knows of a plate may be off by so much light: it turns a normal by more than any angle."""
+"""What nobody knows of a plate may be off by this much light: it turns a normal by more than any angle."""
 NOISE_FACTOR = 1.6
 """Squares of a change below this many times those that noise makes of it are noise."""
 

@@ -8,7 +8,6 @@ from psvideo.compute.memory import lent
 
 Codes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
-Flags = NDArray[np.bool_]
 AT_REST, BEFORE, AFTER, BOTH, NOWHERE = range(5)
 """What a pixel is taken from: the nearer plate as it is, one plate moved along the motion, both, or none."""
 ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)

@@ -17,7 +17,7 @@ WEAK, FAINT = 0.25, 0.01
 """A light that the rig says is weaker than the first share of the strongest reaches a point by what it sends, too. Less
 light than the second, of full scale, says nothing of such a light: black levels are off by up to a tenth of it."""
 LEAST_POINTS, MOST_POINTS = 100, 800
-"""Of fewer, under every light, nothing is said; so many are enough."""
+"""Of fewer, under every light, nothing is said; more than the second are not needed."""
 FEWEST_LIGHTS = 8
 """Under fewer, strengths explain too much: of 16 right sets of five lights 4 came out as wrong, of six 2, of 45 sets of
 8 to 12 none; and of six lights of which one is off, another was named in every third set."""

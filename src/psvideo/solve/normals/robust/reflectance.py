@@ -15,14 +15,14 @@ from psvideo.solve.normals.plate_noise import rows_of
 from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, Values, fitted, joined
 from psvideo.solve.normals.task import Floats, Mask, Samples, Usable
 
-LEAST_LIGHTS = 5
+LIGHTS_FOR_REFLECTANCE = 5
 ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800
 """The model is fitted to this many points of this many rows, to fewer under many lights."""
 MOST_UNSURE = 0.05
 """What a light's plate may be off by for motion, as a share of what shines straight on the surface, where a point still
 speaks for the subject: what was not followed leaves residuals that pass for sheen and roughness."""
 AROUND_SHARE = 1 / 16
-"""Nor may plates be off by more on average over such a share of the picture's longer side: where most of what is around
+"""Nor may plates be off by more on average over this share of the picture's longer side: where most of what is around
 was not followed, what fits does so by chance."""
 
 
@@ -38,7 +38,7 @@ def points_of(
 ) -> SubjectPoints | None:  # fmt: skip
     """Return points of a subject solved in every ``step``-th row; None where they or the lights are too few. Arguments
     are those of ``huber1981.solve``; what is ``unsure`` of the plates is passed over."""
-    if len(plates) < LEAST_LIGHTS:
+    if len(plates) < LIGHTS_FOR_REFLECTANCE:
         return None
     solved = np.arange(0, found.valid.shape[0], step)
     solved = solved[found.valid[solved].any(axis=1)]

@@ -26,7 +26,7 @@ MOST_ODDS, LEAST = np.float32(30), np.float32(1e-6)
 MOST_CHECKS = 2
 """More lights than this beyond three say no more of what is around."""
 OUTLINE = (11, 11)
-"""Over so many points normals are called torn that lie on either side of an outline."""
+"""Normals on either side of an outline are called torn over this many points."""
 NOISELESS = PlateNoise(read=0.0, photon=0.0)
 
 

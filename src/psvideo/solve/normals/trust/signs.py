@@ -33,7 +33,7 @@ UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
 up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
 ENOUGH_LIGHTS = 12
 """What ``hidden`` is measured by: this many lights hide little of what is not matte."""
-LEAST_LIGHTS = 0.02
+LEAST_UNREACHED = 0.02
 """Light from around is known where at least this many lights, in the mean, do not reach a point."""
 
 
@@ -154,6 +154,6 @@ def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
     turned = np.empty(points.known.shape, np.float32)
     fill_indirect_deg(
         points.planes.reshape(3, -1), line(seen.sums), line(seen.counts), near, far, line(points.noise_deg), added,
-        LEAST_LIGHTS, line(turned),
+        LEAST_UNREACHED, line(turned),
     )  # fmt: skip
     return turned

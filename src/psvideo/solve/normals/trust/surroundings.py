@@ -12,7 +12,7 @@ OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)
 """What is around counts up to this many times its typical size, found in this many turns: edges of shadows and creases
 are their own, and of no more than a few of the points."""
 OUTLYING_OF_ONE, OUTLYING_OF_MORE = 4, 2
-"""An outlier counts up to so many times the square of what noise makes of it, of one Gaussian number (which has the
+"""An outlier counts up to this many times the square of what noise makes of it, of one Gaussian number (which has the
 longest tail) or of more: 96 and 95 % of their squares stay. With less, noise took more from a misfit than it added."""
 CERTAIN = np.float32(1)
 """A misfit is certain beyond this many standard errors of the mean square that noise makes of so few points."""

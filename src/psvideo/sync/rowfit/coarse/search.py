@@ -54,7 +54,7 @@ def search(
         return [GridPlace(beat=_placed(start, clocks[a * len(phases_s) + b]), loss=value) for _, a, b, value in best]
     loss = losses(plan, rows, clocks, start, place=np.zeros_like(rows.place))
     loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
-    return _over_readouts(plan, rows, loss, clocks, phases_s, start, keep)
+    return _over_readouts(rows, loss, clocks, phases_s, start, keep)
 
 
 def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) -> FloatArray:
@@ -121,7 +121,6 @@ def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *,
 
 
 def _over_readouts(
-    plan: Plan,
     rows: Profiles,
     loss: FloatArray,
     clocks: list[FoundClock],

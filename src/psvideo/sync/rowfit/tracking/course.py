@@ -94,7 +94,7 @@ def window_frames(plan: Plan) -> int:
 
 
 def memory_frames(plan: Plan, rows: Profiles) -> int:
-    """Return how many frames foretell the next ones: they see every light several times, and the marker."""
+    """Return how many frames predict the next ones: they see every light several times, and the marker."""
     return max(window_frames(plan), int(1.2 * plan.marker_s / rows.period_s))
 
 

@@ -20,7 +20,7 @@ from psvideo.sync.rowfit.tracking.steps_ahead import MOST
 AT_END = 6
 """Frames at either end that are looked at."""
 BEFORE = 4
-"""Frames before those, by which it is judged how well frames are foretold at all."""
+"""Frames before those, by which it is judged how well frames are predicted at all."""
 LEAST_KNOWN = 12
 """Fewer frames than this predict nothing; nor do fewer than two for every light."""
 ODD = 2.0
@@ -49,7 +49,7 @@ def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> ClipEnds:
 def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntArray, int]:
     """Return the places with the end of the arrays put where it fits, and how many frames there fit nowhere.
 
-    From the inside outwards, so that nothing is foretold from frames that are odd themselves. A frame in the dark that
+    From the inside outwards, so that nothing is predicted from frames that are odd themselves. A frame in the dark that
     was taken for a repeat of the one before it may as well be a later one in the dark.
     """
     onward = int(np.sign(index[-1] - index[0]))
@@ -76,7 +76,7 @@ def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntAr
 
 
 def _usual(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice) -> float:
-    """Return how badly the last of the known frames are foretold by those before them."""
+    """Return how badly the last of the known frames are predicted by those before them."""
     learnt = slice(known.start, known.stop - BEFORE)
     return float(_fits(plan, rows, index, beat, learnt, index[known.stop - BEFORE : known.stop]).max())
 

@@ -14,7 +14,7 @@ from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 
 NATURAL = 0.1
-"""A frame that looks like the one before it is repeated only where its own place in time fits worse by so much."""
+"""A frame that looks like the one before it is repeated only where its own place in time fits worse by this much."""
 LONG_BLOCK = 64
 """Frames whose repeats are decided at a time."""
 MEMORY, NEAR = 24, 10

@@ -81,12 +81,12 @@ def _black(shown: FloatArray, frame: int) -> FloatArray:
 
 
 def _shown(rows: Profiles, beat: Beat, flashes: row_model.Flashes, light: FloatArray) -> FloatArray:
-    """Return what known brightnesses foretell under some flashes, shape (frame, row)."""
+    """Return what known brightnesses predict under some flashes, shape (frame, row)."""
     found = np.empty_like(rows.value)
     row_model.predictions(compiled_rows(rows, beat), flashes, light, 0, rows.value.shape[1], found)
     return found
 
 
 def _left(rows: Profiles, shown: FloatArray) -> FloatArray:
-    """Return how badly frames fit what was foretold, shape (frame,)."""
+    """Return how badly frames fit what was predicted, shape (frame,)."""
     return frame_losses(rows, rows.value - shown)

@@ -21,6 +21,6 @@ def frame_losses(rows: Profiles, rest: FloatArray) -> FloatArray:
 
 
 def losses_of(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
-    """Return how badly known brightnesses foretell frames, shape (frame,), on the scale of the reference's spreads."""
+    """Return how badly known brightnesses predict frames, shape (frame,), on the scale of the reference's spreads."""
     rest = rows.value - predictions(plan, rows, beat, light)
     return frame_losses(reference, rest)

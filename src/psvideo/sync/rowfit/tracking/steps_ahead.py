@@ -1,6 +1,6 @@
 """How many frames are missing or repeated just ahead: the cheapest course of the next block through places in time.
 
-Brightnesses found so far foretell each frame at every place that it may have; a Viterbi search picks the course, in
+Brightnesses found so far predict each frame at every place that it may have; a Viterbi search picks the course, in
 which a step between frames other than the one that the numbering gives costs something.
 """
 
@@ -27,7 +27,7 @@ TWIN_COST = 0.2
 MOST_GAIN = 4.0
 """A camera changes its exposure by no more stops than two at once."""
 HOLDS = 1.0
-"""A step is believed where it takes away so much of the frames' losses once brightnesses are fitted again."""
+"""A step is believed where it takes away this share of the frames' losses once brightnesses are fitted again."""
 
 
 def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Mask, sign: int) -> IntArray:
@@ -61,7 +61,7 @@ def _calm(loss: FloatArray, usual: float) -> bool:
 
 
 def _losses_but_for_gain(plan: Plan, learnt: Profiles, ahead: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
-    """Return how badly known brightnesses foretell frames (frame,) that may all be brighter or darker by a gain of
+    """Return how badly known brightnesses predict frames (frame,) that may all be brighter or darker by a gain of
     their own, as where a camera sets its exposure: missing frames would stand for it otherwise."""
     expected = predictions(plan, ahead, beat, light)
     weight = 1.0 / np.maximum(learnt.spread, 0.03 * learnt.spread.max()) ** 2
@@ -85,7 +85,7 @@ def with_steps(index: IntArray, block: slice, extra: IntArray, sign: int) -> Int
 def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, course: IntArray, sign: int) -> bool:
     """Return whether a course still wins when brightnesses are fitted again to all frames from the known ones on.
 
-    Frames that move are foretold badly; fitted along a wrong course they stay bad, along the right one they do not.
+    Frames that move are predicted badly; fitted along a wrong course they stay bad, along the right one they do not.
     """
     count = len(rows.value)
     span = (

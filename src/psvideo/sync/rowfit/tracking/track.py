@@ -1,6 +1,6 @@
 """Tracking: from frames whose times are known to all others, across dropped and repeated frames and a drifting clock.
 
-Block by block away from frames that fit, the brightnesses found so far foretell the next frames at every place in time
+Block by block away from frames that fit, the brightnesses found so far predict the next frames at every place in time
 that they may have; a Viterbi search picks the cheapest course, in which a step between frames other than the one that
 the numbering gives costs something. Then the clock is sharpened on the latest frames and the next block follows.
 """
@@ -55,7 +55,7 @@ clip's beginning."""
 def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int, leap: Leap | None = None) -> FrameTrack:
     """Follow the strobe through the whole clip from the frames ``seed``, most of which ``beat`` fits.
 
-    The latest ``memory`` frames foretell the next ones. Where a ``leap`` is found, frames beyond are not followed.
+    The latest ``memory`` frames predict the next ones. Where a ``leap`` is found, frames beyond are not followed.
     """
     for _ in range(2):
         low, high = _anchor(plan, rows, beat, seed)

@@ -15,7 +15,7 @@ from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, FEIGNED, bl
 CLEAR = 5.0
 """A time leaves the plan's value only when it is off by this many standard errors."""
 BETTER, LEAST_GAIN = 1e-3, 30.0
-"""And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
+"""And only where that takes away this share of the robust loss, and this much of it: a subject that moves in step with
 the dark row bends errors and estimates alike."""
 STILL, PLAIN = 0.95, 0.3
 """Where a fit takes away less of the robust loss than the first (a subject that moves), a time that leaves the plan's
@@ -32,7 +32,7 @@ SOFTER, WORTH = (0.02, 0.06, 0.18), 1.0
 """Tails, as shares of the shortest flash, that are tried where rise and fall are alike: they leave the length of a
 flash as it is, so that small ones change nothing to the first order. Freeing them must take away so much at least."""
 SOFT = 3.0
-"""Edges are soft where tails take away so much of the robust loss,"""
+"""Edges are soft where tails take away this much of the robust loss,"""
 UNTOLD = 0.6
 """and put the times in doubt by this share of how far tails beside a blur would move them: it may be tails or none."""
 TAILS, BLUR = ("rise_s", "fall_s"), "blur_s"
@@ -197,7 +197,7 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
 
 
 def _may_hide_tails(plan: Plan, rows: Profiles, fit: Fit) -> bool:
-    """Return whether LEDs may rise and fall slowly without the picture or the plan telling it: the subject moves."""
+    """Return whether LEDs may rise and fall slowly without the picture or the plan showing it: the subject moves."""
     plain = replace(rows, restless=None)
     told = max(plan.rise_s, plan.fall_s) > 0.0
     return not told and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL

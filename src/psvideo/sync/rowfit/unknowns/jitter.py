@@ -23,7 +23,7 @@ LEAST_FLASHES = 8
 SURE = 5.0
 """Standard deviations of Fisher's z (1921) by which openings and closings must agree before flashes are moved."""
 FEW, LIKELY = 0.5, 2.5
-"""Where so small a share of the flashes has both, as below 360 degrees, these few need agree by so much only, if even
+"""Where so small a share of the flashes has both, as below 360 degrees, these few need agree by this much only, if even
 and odd rows agree as well."""
 ALIKE = 1 - 1e-9
 ROUNDS = 4

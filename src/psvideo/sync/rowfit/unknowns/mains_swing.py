@@ -15,7 +15,7 @@ from psvideo.sync.rowfit.profiles import Profiles, brightnesses
 from psvideo.sync.rowfit.refine import Fit
 
 MAINS_OFF_HZ = 0.5
-"""Light pulses come so much faster or slower at most: twice what grids allow of 50 and 60 Hz."""
+"""Light pulses come this much faster or slower at most: twice what grids allow of 50 and 60 Hz."""
 LEAST_WINDOWS = 3
 """Fewer windows do not show how far they are apart by chance."""
 SURE = 5.0

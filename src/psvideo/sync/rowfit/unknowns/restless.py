@@ -19,9 +19,9 @@ from psvideo.sync.rowfit.refine import LAST_SCALE, Fit, robust_loss
 from psvideo.sync.rowfit.row_model import Flashes, Rows, seen_of
 
 SPLIT = 0.3
-"""Each of two frames must have seen so much of a flash that what they say across its parts counts."""
+"""Each of two frames must have seen this much of a flash before what they say across its parts counts."""
 WHOLE = 0.7
-"""A frame that saw so much of one shows how much flashes differ."""
+"""A frame that saw this much of one shows how much flashes differ."""
 NEAR_ROWS = 8
 """Rows on either side that stand in for a row: few frames split a flash in any one row."""
 LEAST = 24

@@ -30,7 +30,7 @@ BLURRED = 0.05
 """Edges that are blurred put the times in doubt by this share of how soft they are: 19 encodes whose blur was not worth
 freeing anything were off by 0.01 to 0.08 of it, 0.04 on an average."""
 SOFT_ROWS, SOFT = (0.1, 0.2, 0.4, 0.8, 1.6), 3.0
-"""How soft edges are is tried in these steps; the best one must take away so much of the robust loss."""
+"""How soft edges are is tried in these steps; the best one must take away this share of the robust loss."""
 REACHES_ROWS = 3.0
 """A blur reaches this many rows: what differs by more is no blur."""
 OUTLIER = 6.0

@@ -6,7 +6,8 @@ saw. Flashes touch neighbouring frames only, so that its Cholesky factor has a d
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
-from psvideo.sync.rowfit.row_model import REACH, Flashes, Rows, seen_of
+from psvideo.model.rows.shutter import REACH
+from psvideo.sync.rowfit.row_model import Flashes, Rows, seen_of
 
 
 @EXACT.kept

@@ -18,7 +18,7 @@ Field = Callable[[FloatArray], FloatArray]
 COARSE = 4
 """Fine cells along a coarse cell's edge."""
 POINTS = 1 << 15
-"""So many points are asked for at a time: what a field of many parts holds of them stays in the processor's cache."""
+"""This many points are asked for at a time: what a field of many parts holds of them stays in the processor's cache."""
 
 
 def extract_surface(
