@@ -91,3 +91,40 @@ def test_flashes_beside_a_break_are_complete_only_where_they_fired(
     assert off.max() < max(0.1, 4 * timing.phase_error_rows)
     inside = [one for one in fired if one.lights and 2 < one.start_s / period_s < frames - 3]
     assert len(off) > len(inside) - 6 * period_s / (plan.cycle_s / len(plan.cycle_slots))
+
+
+@pytest.mark.parametrize(
+    ("lights", "shutter", "readout", "frames", "stops", "many"),
+    [
+        pytest.param(3, 1.0, 0.3, 64, 13.9, 14, id="near-the-beginning"),
+        pytest.param(4, 0.25, 1.0, 52, 25.14, 21, id="in-the-middle"),
+        pytest.param(3, 0.5, 1.0, 63, 41.6, 19, id="near-the-end"),
+    ],
+)
+@pytest.mark.parametrize("rest", [-0.6, 0.0, 0.04, 0.15])
+def test_a_strobe_that_moves_by_many_frames_and_a_little_started_again(
+    rest: float,
+    lights: int,
+    shutter: float,
+    readout: float,
+    frames: int,
+    stops: float,
+    many: int,
+    make_plan: PlanMaker,
+) -> None:
+    plan = make_plan(height_px=48, width_px=12, lights=tuple("abcde"[:lights]), shutter=shutter, readout=readout)
+    period_s, cycle_s = plan.camera.frame_period_s, plan.cycle_s * (1 + PPM * 1e-6)
+    before, _ = broken_off(plan, 3, frames=frames, stops=stops, begins=frames + 9.0)
+    first_s = next(one.start_s for one in before if one.slot == plan.cycle_slots[0])
+    begins_s = first_s - many * period_s + rest * plan.shortest_flash_s
+    begins_s += cycle_s * np.ceil(((stops + 0.5) * period_s - begins_s) / cycle_s)
+    fired, profiles = broken_off(plan, 3, frames=frames, stops=stops, begins=begins_s / period_s)
+    timing = find_timing(plan, np.arange(frames), profiles)
+    assert off_rows(plan, timing, fired, frames).max() < 4 * timing.phase_error_rows < 0.8
+    if rest:
+        assert not timing.dropped_frames
+        own_s = np.array([one.start_s for one in fired])
+        complete_s = np.array([one.start_s for one in timing.flashes if one.complete and one.lights])
+        assert np.abs(complete_s[:, None] - own_s).min(axis=1).max() < 0.02 * plan.shortest_flash_s
+    else:
+        assert [hole.count for hole in timing.dropped_frames] == [many]

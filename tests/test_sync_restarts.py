@@ -18,8 +18,8 @@ from psvideo.sync.restarted import recut
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.fit import ClipFit, find
+from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.restarts import TICKS, moved
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
 from psvideo.sync.rowfit.tracking.steps_ahead import steps_ahead
 from psvideo.sync.unbroken import unbroken

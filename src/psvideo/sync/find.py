@@ -22,9 +22,10 @@ from psvideo.sync.beside_breaks import doubted_places
 from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
 from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
-from psvideo.sync.restarted import found_beside_dark, found_in_parts
+from psvideo.sync.restarted import found_apart, found_beside_dark, found_in_parts
 from psvideo.sync.rowfit.beat import Beat, train_until
 from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.moved_at_breaks import moved_at_breaks
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import may_restart, odd_somewhere
 from psvideo.sync.rowfit.tracking.course import window_frames
@@ -110,6 +111,9 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
     whole, believed = verdict.found, verdict.believed
     if believed and not may_restart(plan, rows, whole):
         return []
+    apart = found_apart(plan, rows, moved_at_breaks(plan, whole)) if believed else []
+    if len(apart) > 1:
+        return apart
     parts = found_in_parts(plan, rows)
     if not parts:
         parts = found_beside_dark(plan, rows)

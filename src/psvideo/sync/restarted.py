@@ -45,6 +45,11 @@ def found_beside_dark(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]
     return _found(plan, rows, lit_stretches(plan, rows))
 
 
+def found_apart(plan: Plan, rows: Profiles, cuts: Sequence[int]) -> list[tuple[slice, ClipFit]]:
+    """Return the same of the parts of a clip that begin at some frames, in order."""
+    return _found(plan, rows, [slice(a, b) for a, b in pairwise([0, *cuts, len(rows.value)])])
+
+
 def _found(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[tuple[slice, ClipFit]]:
     if len(cuts) < 2:
         return []

@@ -17,6 +17,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import Mask, stood_in
 from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.row_model import IntArray
@@ -40,8 +41,6 @@ APART = 0.1
 """Beside a hole, flashes that come earlier or later than it says by this share of the shortest one have moved."""
 HALVES = 0.5
 """The move must leave less than this share of the frames' losses where the clock is fitted to all of them again."""
-TICKS = 1_000_000
-"""Places in time between frames are counted in such parts of a frame."""
 MOSTLY = 0.8
 """The strobe may have stopped where this share of the frames after the first odd one are odd."""
 ODD_RUN = 8
@@ -121,12 +120,6 @@ def _restart_in(plan: Plan, rows: Profiles) -> int | None:
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows), leap=leap)
     at = tracked.leaps[0] if tracked.leaps else _beside_holes(plan, kept, tracked)
     return None if at is None else int(frames[at])
-
-
-def moved(rows: Profiles, shift_s: float) -> Profiles:
-    """Return the profiles as if all their frames had come later."""
-    ticks = round(shift_s / rows.period_s * TICKS)
-    return replace(rows, index=rows.index * TICKS + ticks, period_s=rows.period_s / TICKS)
 
 
 def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, extra: IntArray, sign: int) -> int | None:
