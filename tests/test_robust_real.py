@@ -24,11 +24,10 @@ DIM = replace(huber1981.USABLE, dark_level=0.0005)  # the exposures of DiLiGenT 
 
 
 class Subject(NamedTuple):
-    plates: list[NDArray[np.uint16]] | list[NDArray[np.float32]]
+    plates: list[NDArray[np.float32]]
     lit: Illumination
     truth: NDArray[np.floating]
     mask: NDArray[np.bool_]
-    scale: float = 1.0
 
     def under(self, lights: NDArray[np.intp]) -> "Subject":
         lit = Illumination(directions=self.lit.directions[lights], intensities=self.lit.intensities[lights])
@@ -37,10 +36,10 @@ class Subject(NamedTuple):
     def plain_deg(self) -> NDArray[np.float64]:
         """Errors of least squares over everything."""
         usable = woodham1980.EVERYTHING
-        return self.errors_deg(woodham1980.solve(self.plates, self.lit, usable=usable, scale=self.scale))
+        return self.errors_deg(woodham1980.solve(self.plates, self.lit, usable=usable))
 
     def robust(self, usable: woodham1980.Usable = huber1981.USABLE) -> Surface:
-        return huber1981.solve(self.plates, self.lit, usable=usable, scale=self.scale)
+        return huber1981.solve(self.plates, self.lit, usable=usable)
 
     def errors_deg(self, surface: Surface) -> NDArray[np.float64]:
         both = surface.valid & self.mask
@@ -56,9 +55,10 @@ def ball(shared_data: Path) -> Subject:
         rows = [row for row in csv.reader(file) if row[0].endswith(".png")]
     numbers = np.array([[float(word) for word in row[1:7]] for row in rows])
     lit = Illumination(directions=numbers[:, :3], intensities=numbers[:, 3:] / numbers[:, 3:].mean())
-    plates = [read_picture(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows]
+    codes = (read_picture(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows)
+    plates = [(picture / np.float32(65535)).astype(np.float32) for picture in codes]
     mask = read_picture(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
-    return Subject(plates, lit, np.load(folder / "normal_gt.npy"), mask, 1 / 65535)
+    return Subject(plates, lit, np.load(folder / "normal_gt.npy"), mask)
 
 
 def test_the_ball_of_diligent_with_48_lights(ball: Subject) -> None:
