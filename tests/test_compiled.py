@@ -326,6 +326,7 @@ takes = (
     (SmallTake(lights=4, kind="exr", motion=moving, float32=True), {"float32": True}),
     (SmallTake(lights=8), {"solver": "least-squares", "aov": ("residual", "error")}),
     (SmallTake(lights=3), {"solver": "robust"}),
+    (SmallTake(lights=3), {"aov": ("error",)}),
     (SmallTake(lights=4, near=True), {}),
     (SmallTake(lights=8, near=True), {"aov": ("depth",)}),
     (SmallTake(lights=6, kind="png8", camera='bits = 8, transfer = "srgb"', motion=moving), {}),

@@ -137,14 +137,14 @@ def test_lights_in_one_plane_are_warned_of() -> None:
 
 
 def test_no_sphere_or_half_a_sphere_is_refused() -> None:
-    noise = np.random.default_rng(0).normal(0.1, 0.01, (3, 100, 150)).astype(np.float32)
+    noise = np.random.default_rng(0).normal(0.1, 0.01, (3, 50, 75)).astype(np.float32)
     with pytest.raises(SphereNotFoundError, match="no sphere found"):
         sight_spheres([light_pictures("abc", list(noise))], Looking(), where="wall")
-    cut = shoot(Lens(width=300, height=300), [Ball(centre=(-0.085, 0.0, -0.5))], DISTANT)
+    cut = shoot(Lens(width=200, height=200, focal=600.0), [Ball(centre=(-0.085, 0.0, -0.5))], DISTANT)
     with pytest.raises(SphereNotFoundError, match=r"cut by the frame|no sphere found"):
         sight_spheres([cut], Looking(), where="cut")
     with pytest.raises(SphereNotFoundError, match="cut by the frame"):
-        sight_spheres([cut], Looking(circles=((0.0, 150.0, 90.0),)), where="cut")
+        sight_spheres([cut], Looking(circles=((0.0, 100.0, 60.0),)), where="cut")
 
 
 def test_a_matte_sphere_is_refused_with_what_to_do() -> None:

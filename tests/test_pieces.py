@@ -215,9 +215,17 @@ GLOSSY += "".join(
 )
 
 
-def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_first_noted(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(GLOSSY, encoding="utf-8")
-    clip = Path(ps.shoot(tmp_path / "scene.toml", tmp_path / "clip").path)
+@pytest.fixture(scope="module")
+def glossy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("glossy")
+    (folder / "scene.toml").write_text(GLOSSY, encoding="utf-8")
+    return Path(ps.shoot(folder / "scene.toml", folder / "clip").path)
+
+
+def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_first_noted(
+    glossy: Path, tmp_path: Path
+) -> None:
+    clip = shutil.copytree(glossy, tmp_path / "clip")
     given: dict[str, Any] = {"rig": clip / "rig.toml", "preview": ()}
     whole = ps.normals(clip, out=tmp_path / "whole", **given)
     found = {None if one.misfit is None else one.misfit.reflectance for one in whole.instants}
@@ -232,10 +240,9 @@ def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_
     assert judged(tmp_path / "pieces") == judged(tmp_path / "whole")
 
 
-def test_what_comes_in_late_is_looked_at_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_comes_in_late_is_looked_at_too(glossy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spread, "EACH", 2)
-    (tmp_path / "scene.toml").write_text(GLOSSY, encoding="utf-8")
-    take = ps.open_take(Path(ps.shoot(tmp_path / "scene.toml", tmp_path / "clip").path))
+    take = ps.open_take(glossy)
     timing = ps.find_timing(take)
     every = {one.number: one for one in gather(take, timing, aligning=Aligning())}
     read: list[int] = []

@@ -244,4 +244,4 @@ def test_what_was_trusted_throughout_a_block_is_let_go_with_the_next() -> None:
 def copied(one: Surface) -> dict[str, Any]:
     """What a surface holds, in memory of its own: holding it steady writes into it."""
     arrays = {name: getattr(one, name) for name in ("normals", "albedo", "valid", "error_deg", "source")}
-    return {name: None if array is None else array.copy() for name, array in arrays.items()}
+    return {name: None if array is None else array.copy(order="K") for name, array in arrays.items()}

@@ -66,7 +66,7 @@ FRAMES_LIVE = 72
 USUAL = (
     SmallTake(lights=8, aov=("residual", "error", "depth", "beauty"), gloss=GLOSS, live=True),
     SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }", aov=("depth",)),
-    SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
+    SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"', aov=("error",), live=True),
     SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"', live=True),
     SmallTake(lights=3, kind="exr", float32=True),  # frames of 32 bits, as Algorithm 1's pictures are
     SmallTake(lights=3, near=True),
@@ -119,6 +119,17 @@ def filmed(take: SmallTake, folder: Path) -> Path:
     return clip
 
 
+def _halve_one(clip: Path) -> None:
+    """Halve a plate, as runs do with large pictures before they look for motion."""
+    from psvideo.plates.gather import gather
+    from psvideo.plates.timed import read_or_find_timing
+    from psvideo.sync.open_take import open_take
+
+    take = open_take(clip)
+    some = next(iter(gather(take, read_or_find_timing(take, None, first_light=None))))
+    some.plates[0].picture.halved()
+
+
 def _as_floats(frames: Path) -> None:
     """Write half-float frames again as 32-bit floats, as renderers do: pictures that no code of 16 bits holds."""
     from psvideo.clip.decode.exr import read_halves
@@ -137,6 +148,7 @@ def run_small(take: SmallTake) -> None:
     with tempfile.TemporaryDirectory(prefix="psvideo-compiling-") as folder:
         clip = filmed(take, Path(folder))
         normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
+        _halve_one(clip)
         if take.live:
             live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
 
