@@ -1,6 +1,7 @@
 """Genlock through the picture: the strobe is trimmed until the dark row stands where it is wanted, and stays there."""
 
 import math
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,7 +28,7 @@ from psvideo.live.following.genlock import (
     rows_around,
     target_of,
 )
-from psvideo.live.following.holding import Holding
+from psvideo.live.following.holding import Holding, trim_by
 from psvideo.live.following.trims import Trims
 from psvideo.model.plan import Plan
 from psvideo.runs.on_set.live_strobe import held_strobe
@@ -221,6 +222,56 @@ def test_a_trim_counts_from_its_moment_though_minutes_of_another_lie_before_it()
     slope_ppm = 1e6 * np.diff(clock.bend(strobe_s)) / np.diff(strobe_s)
     np.testing.assert_allclose(slope_ppm[comes_s[1:] < 600.0], -900, atol=0.1)
     np.testing.assert_allclose(slope_ppm[comes_s[:-1] > 600.0], 1000, atol=0.1)
+
+
+def test_trims_come_late_by_the_sum_of_what_each_adds_however_many_there_are() -> None:
+    rng = np.random.default_rng(1)
+    trims, asked_s = Trims(), np.linspace(-1.0, 41.0, 501)
+    for at_s in [0.0, *np.sort(rng.uniform(0, 40, 300)).tolist(), 40.0]:
+        trims.add(at_s, float(rng.integers(-MAX_TRIM_PPM, MAX_TRIM_PPM)))
+    steps_ppm = np.diff(trims.ppm, prepend=0.0)
+    since_s = np.maximum(asked_s[:, None] - np.array(trims.at_s), 0.0)
+    np.testing.assert_allclose(trims.late_s(asked_s), 1e-6 * since_s @ steps_ppm, atol=1e-12)
+
+
+def test_a_trim_costs_the_same_after_an_hour_as_in_the_first_minute() -> None:
+    trims, clock = Trims(), FoundClock(phase_s=0.0, offset_ppm=30.0)
+
+    def least_cost_s(first: int) -> float:
+        costs = []
+        for number in range(first, first + 50):
+            began_s = time.process_time()
+            trims.add(0.1 * number, float(number * 37 % 2000 - 1000))
+            trims.bent(clock, since_s=0.1 * number - 1.0)
+            costs.append(time.process_time() - began_s)
+        return min(costs)
+
+    early_s = least_cost_s(100)
+    for number in range(150, 3000):
+        trims.add(0.1 * number, float(number * 37 % 2000 - 1000))
+    assert least_cost_s(3000) < 5 * early_s
+
+
+def test_frames_do_not_wait_for_the_boards_answer_to_a_trim(make_plan: PlanMaker) -> None:
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=lambda at_s: 900.0)
+    lock(loop)
+    taken = []
+
+    def slow(request: object) -> object:
+        def take() -> None:
+            with loop.chain.at_rest():
+                taken.append(request)
+
+        frame = threading.Thread(target=take, daemon=True)
+        frame.start()
+        frame.join(5.0)
+        return len(taken)
+
+    holding = replace(holding_of(loop, "30"), ask=slow)
+    holding.beat(loop.host_s)
+    assert taken == [trim_by(holding.ppm)]
+    assert loop.chain.follower is not None
+    assert loop.chain.follower.trims.ppm == [holding.ppm]
 
 
 def wait_until(true: Callable[[], bool]) -> bool:

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -247,7 +248,9 @@ def test_sync_starts_from_what_the_log_says(clip: Path, capsys: pytest.CaptureFi
 def test_the_log_of_another_plan_is_warned_of_and_not_used(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan = clip / "plan.toml"
     assert run("strobe", "run", plan, "--port", "emulated", "--rounds", 1, "--log", clip / "strobe.json", "-q") == 0
-    plan.write_text(plan.read_text() + "# changed\n")
+    played = plan.read_text()
+    assert "dark_s = 0.0101003" in played
+    plan.write_text(played.replace("dark_s = 0.0101003", "dark_s = 0.0101013"))
     capsys.readouterr()
     assert run("sync", clip) == 0
     said = capsys.readouterr().err
@@ -269,6 +272,35 @@ def test_a_plan_as_played_has_the_board_s_times_and_powers(
     assert played.flashes[0].lights["key"] == pytest.approx(0.37, abs=1e-12)
     assert played.dark_s == pytest.approx(0.009, abs=1e-12)
     assert played.clock_tolerance_ppm == 5100
+
+
+def test_a_plan_whose_camera_was_put_right_keeps_its_log_and_one_that_asks_for_other_ticks_does_not(
+    tmp_path: Path, make_plan: Callable[..., Plan]
+) -> None:
+    """Remarks advise to write what was found of the camera into the plan that the strobe played."""
+    path, log = tmp_path / "plan.toml", tmp_path / "strobe.json"
+    asked = make_plan(lights=("key", "fill"))
+    flashes = (
+        PlannedFlash(lights={"key": 0.371, "fill": 0.0}, duration_s=0.0008),
+        PlannedFlash(lights={"key": 0.0, "fill": 1.0}, duration_s=0.0008),
+        PlannedFlash(lights={"key": 0.0, "fill": 0.0}, duration_s=0.0008),
+    )
+    plan = Plan(camera=asked.camera, flashes=flashes, dark_s=0.009)
+    path.write_text(format_plan(plan))
+    assert run("strobe", "run", path, "--port", "emulated", "--rounds", 1, "--log", log, "-q") == 0
+    plan = read_plan(path)
+
+    def warned(changed: Plan) -> bool:
+        path.write_text(format_plan(changed))
+        return as_played(read_plan(path), path).warning is not None
+
+    assert not warned(plan)
+    assert not warned(replace(plan, camera=replace(plan.camera, readout_s=0.9 * (plan.camera.readout_s or 0.01))))
+    assert warned(replace(plan, dark_s=plan.dark_s + 1e-6))
+    assert warned(replace(plan, flashes=tuple(replace(flash, duration_s=0.000802) for flash in flashes)))
+    dimmer = replace(flashes[0], lights={"key": 0.38, "fill": 0.0})
+    assert warned(replace(plan, flashes=(dimmer, *flashes[1:])))
+    assert warned(replace(plan, dark_every=2)), "the same flashes in another cycle"
 
 
 def test_a_log_comes_back_as_it_was_and_a_broken_one_is_named(plan_file: Path) -> None:

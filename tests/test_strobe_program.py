@@ -99,6 +99,20 @@ def _on_and_off(begin: int, duration: int, light: str, program: Program) -> tupl
     return Edge(tick=begin, line=line, level=1), Edge(tick=begin + duration, line=line, level=0)
 
 
+def test_a_flash_of_more_lines_than_one_request_names_is_refused_before_anything_is_sent(make_plan: MakePlan) -> None:
+    names = tuple("abcdefgh")
+    flashes = (
+        PlannedFlash(lights=dict.fromkeys(names, 1.0), duration_s=0.0008),
+        PlannedFlash(lights=dict.fromkeys(names, 0.0), duration_s=0.0008),
+    )
+    plan = replace(make_plan(), flashes=flashes)
+    caps = capabilities(BOARDS["rp2040"], "direct")
+    with pytest.raises(PsvideoError, match=r"a flash of 8 lines takes a request of \d+ bytes, and the board reads 96"):
+        make_program(plan, caps)
+    program = make_program(plan, caps, lines=dict.fromkeys(names, 0))
+    assert max(len(format_request(request).rstrip()) for request in program.upload()) <= LONGEST_REQUEST
+
+
 def test_a_plan_in_whole_ticks_is_played_exactly_and_nothing_accumulates(make_plan: MakePlan) -> None:
     plan = replace(make_plan(), dark_s=0.0083425)
     program = make_program(plan, UNO)

@@ -22,8 +22,8 @@ from psvideo.strobe.link.exchange import Link, NoReplyError, RefusedError
 from psvideo.strobe.link.greeting import greet
 from psvideo.strobe.link.lines import seal
 from psvideo.strobe.link.ports import SerialPort, choose_port
-from psvideo.strobe.link.replies import Capabilities, Cleared, KeepSet, Started
-from psvideo.strobe.link.requests import Caps, Clear, Keep, Run, Slot
+from psvideo.strobe.link.replies import Capabilities, Cleared, KeepSet, Started, Trimmed
+from psvideo.strobe.link.requests import Caps, Clear, Keep, Run, Slot, Trim
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.session import Outcome, RunProgress, cycles_for, prepare, run_program
 from psvideo.strobe.stand_ins.python_board import PythonBoard
@@ -211,6 +211,45 @@ def test_a_board_that_restarts_in_the_middle_is_noticed(board: Board, program: P
     outcome, _ = play(link, program, watch=lambda beat: board.controller.restart("brownout", board.now))
     assert outcome.ended == "fault"
     assert "reset: brownout" in (outcome.fault or "")
+
+
+def test_a_board_that_counts_from_0_again_leaves_no_nonsense_clock(board: Board, program: Program) -> None:
+    link = opened(board.device)
+    prepare(link)
+    beats: list[RunProgress] = []
+
+    def restart_late(beat: RunProgress) -> None:
+        beats.append(beat)
+        if len(beats) == 5:
+            board.controller.restart("watchdog", board.now)
+
+    outcome, _ = play(link, program, watch=restart_late)
+    assert outcome.ended == "fault"
+    assert outcome.clock is not None
+    assert outcome.clock.readings == 5
+    assert abs(outcome.clock.offset_ppm) <= outcome.clock.gain_error_ppm + 1e3
+
+
+def test_readings_after_a_fall_of_the_ticks_are_left_out() -> None:
+    before = [ClockQuery(ticks=2 * 10**6 * n, asked_s=n - 1e-4, answered_s=n + 1e-4) for n in range(5)]
+    after = [ClockQuery(ticks=2 * 10**6 * n, asked_s=5 + n - 1e-4, answered_s=5 + n + 1e-4) for n in range(5)]
+    fit = fit_clock([*before, *after], tick_ps=500_000)
+    assert fit == fit_clock(before, tick_ps=500_000)
+
+
+def test_a_refused_trim_does_not_say_that_the_lights_are_dark(board: Board, program: Program) -> None:
+    link = opened(board.device)
+    prepare(link)
+    said: list[str] = []
+
+    def trim(beat: RunProgress) -> None:
+        with pytest.raises(RefusedError) as caught:
+            link.ask(Trim(way="later", ppm=10**6), Trimmed)
+        said.append(str(caught.value))
+
+    play(link, program, cycles=20, watch=trim)
+    assert said
+    assert all("dark" not in words and "The trim before it counts on" in words for words in said)
 
 
 def test_a_board_that_is_silent_while_it_restarts_is_waited_for() -> None:

@@ -6,6 +6,7 @@ every query bounds the line, and two queries far apart bound its gain hard, howe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,7 +44,11 @@ class ClockFit:
 
 
 def fit_clock(readings: Sequence[ClockQuery], *, tick_ps: int) -> ClockFit | None:
-    """Return the line through clock queries, weighted by their round trips; None for fewer than two moments."""
+    """Return the line through clock queries, weighted by their round trips; None for fewer than two moments.
+
+    A board that starts again counts from 0: what it says from there on is left out.
+    """
+    readings = _until_restart(readings)
     kept = _thinned(readings)
     if len(kept) < 2:
         return None
@@ -73,6 +78,11 @@ def _gain(ticks: FloatArray, asked_s: FloatArray, answered_s: FloatArray, best: 
     low = float(((asked_s[second] - answered_s[first]) / apart).max())
     high = float(((answered_s[second] - asked_s[first]) / apart).min())
     return min(max(best, min(low, high)), max(low, high)), low, high
+
+
+def _until_restart(readings: Sequence[ClockQuery]) -> Sequence[ClockQuery]:
+    fell = (n for n, (before, now) in enumerate(pairwise(readings), 1) if now.ticks < before.ticks)
+    return readings[: next(fell, len(readings))]
 
 
 def _thinned(readings: Sequence[ClockQuery]) -> list[ClockQuery]:

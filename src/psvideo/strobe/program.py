@@ -23,6 +23,8 @@ from psvideo.strobe.limits import (
     slot_refusal,
     total_ppm,
 )
+from psvideo.strobe.link.lines import LONGEST_REQUEST
+from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.link.replies import Capabilities
 from psvideo.strobe.link.requests import Arm, Lit, New, Request, Slot, Steps
 from psvideo.strobe.wiring import wire
@@ -202,6 +204,13 @@ def _as_played(flash: PlannedFlash, slot: Slot, tick_s: float, lines: Mapping[st
 
 
 def _over_limits(program: Program, caps: Capabilities) -> Iterator[str]:
+    for slot in program.slots:
+        long = len(format_request(slot).rstrip(b"\n"))
+        if long > LONGEST_REQUEST:
+            yield (
+                f"a flash of {len(slot.lit)} lines takes a request of {long} bytes, and the board reads "
+                f"{LONGEST_REQUEST} (lights that always flash together may hang on one line)"
+            )
     if len(program.slots) > caps.slots:
         yield f"the plan has {len(program.slots)} different flashes, and the board holds {caps.slots}"
     cycle_s = program.cycle_ticks * program.tick_ps / PS_PER_S

@@ -12,10 +12,12 @@ from pydantic import Field
 
 from psvideo.formats.contract import Contract, parse_record, read_json
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
+from psvideo.strobe.bursts import POWER_TOLERANCE
 from psvideo.strobe.clock import ClockFit
-from psvideo.strobe.limits import lit_ticks
+from psvideo.strobe.limits import cycle_check, lit_ticks
+from psvideo.strobe.link.requests import Lit, Slot
 from psvideo.strobe.link.words import WiringName
-from psvideo.strobe.program import PS_PER_S, Program
+from psvideo.strobe.program import PS_PER_S, Program, to_ticks
 from psvideo.strobe.session import Ended, Outcome, Ready
 
 SCHEMA = "psvideo-strobe/1"
@@ -144,7 +146,7 @@ def as_played(plan: Plan, plan_path: Path) -> AsPlayed:
     if plan.mode == "synced" or not path.is_file():
         return AsPlayed(plan=plan)
     log = read_log(path)
-    if log.plan_sha256 != plan_sha256(plan_path) or not _fits(plan, log):
+    if not _fits(plan, log) or (log.plan_sha256 != plan_sha256(plan_path) and not _plays(plan, log)):
         return AsPlayed(
             plan=plan,
             warning=f"{path.name} is the log of another plan than {plan_path.name} beside it, and is not used; put the "
@@ -160,6 +162,29 @@ def as_played(plan: Plan, plan_path: Path) -> AsPlayed:
 
 def _fits(plan: Plan, log: RunLog) -> bool:
     return [set(flash.lit) for flash in plan.flashes] == [set(flash.lit_ticks) for flash in log.flashes]
+
+
+def _plays(plan: Plan, log: RunLog) -> bool:
+    """Return whether a plan asks for the very ticks of a log: what it says of the camera may have been put right."""
+    if to_ticks(plan.dark_s, log.tick_ps) != log.dark_ticks:
+        return False
+    for planned, played in zip(plan.flashes, log.flashes, strict=True):
+        if to_ticks(planned.duration_s, log.tick_ps) != played.duration_ticks:
+            return False
+        for name, ticks in played.lit_ticks.items():
+            asked = planned.lights[name]
+            if abs(ticks / played.duration_ticks - asked) > POWER_TOLERANCE * asked:
+                return False
+    slots = [_slot_of(flash, log) for flash in log.flashes]
+    return cycle_check([slots[slot] for slot in plan.cycle_slots]) == log.check
+
+
+def _slot_of(flash: PlayedFlash, log: RunLog) -> Slot:
+    """Return what was sent for a flash; no burst is ever cut short."""
+    bursts = -(-flash.duration_ticks // flash.period_ticks)
+    pairs = sorted({(log.lines[name], ticks // bursts) for name, ticks in flash.lit_ticks.items()})
+    lit = tuple(Lit(line=line, on=on) for line, on in pairs)
+    return Slot(slot=0, duration=flash.duration_ticks, dark=log.dark_ticks, period=flash.period_ticks, lit=lit)
 
 
 def _played(plan: Plan, log: RunLog) -> Plan:

@@ -184,12 +184,12 @@ def _follow(
     began_s = time.monotonic()
     while True:
         clock, asked_s, answered_s = link.read_clock()
-        record.readings.append(ClockQuery(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
         status = link.ask(Stat(), Status)
         if status.state == "fault":
             return f"{status.fault}: {FAULTS[status.fault]}"
         if status.state == "idle" and (cycles is None or status.cycles < cycles):
             return f"restarted: the board started again in the middle of the run (reset: {status.reset})"
+        record.readings.append(ClockQuery(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
         record.cycles = status.cycles
         elapsed_s = time.monotonic() - began_s
         left_s = None if lasts_s is None else max(lasts_s - elapsed_s, 0.0)

@@ -43,19 +43,27 @@ class Holding:
             return
         self._asked_s = host_s
         with self.chain.at_rest():
-            follower = self.chain.follower
-            if follower is None or follower.state == "lost":
-                self.short_rows, wanted = None, 0
-            elif follower.state != "locked":
-                return
-            else:
-                camera = follower.lock.camera
-                seen: DarkRow = dark_row(follower, self.chain.camera_s(host_s))
-                self.short_rows = seen.short_of(self.target, rows_around(camera))
-                wanted = next_trim_ppm(self.ppm, seen, self.target, camera)
-            if wanted != self.ppm and self._trimmed(wanted) and follower is not None:
-                step_s = self.chain.plan.cycle_s / len(self.chain.plan.cycle_slots)
-                follower.trimmed(self.chain.camera_s(host_s) + STEPS_UNTIL * step_s, float(wanted))
+            wanted = self._wanted_ppm(host_s)
+            step_s = self.chain.plan.cycle_s / len(self.chain.plan.cycle_slots)
+            counts_s = self.chain.camera_s(host_s) + STEPS_UNTIL * step_s
+        if wanted == self.ppm or not self._trimmed(wanted):  # frames do not wait for the board's answer
+            return
+        with self.chain.at_rest():
+            if self.chain.follower is not None:
+                self.chain.follower.trimmed(counts_s, float(wanted))
+
+    def _wanted_ppm(self, host_s: float) -> int:
+        """Return the trim that is due now, none where the strobe is lost."""
+        follower = self.chain.follower
+        if follower is None or follower.state == "lost":
+            self.short_rows = None
+            return 0
+        if follower.state != "locked":
+            return self.ppm
+        camera = follower.lock.camera
+        seen: DarkRow = dark_row(follower, self.chain.camera_s(host_s))
+        self.short_rows = seen.short_of(self.target, rows_around(camera))
+        return next_trim_ppm(self.ppm, seen, self.target, camera)
 
     def _trimmed(self, ppm: int) -> bool:
         try:

@@ -1,5 +1,6 @@
 """What a strobe was told to do to its own period while it was followed: bends of its clock that are foreseen."""
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,11 +22,12 @@ class Trims:
     """Trims by time: from ``at_s[k]`` on flashes come later by ``ppm[k]`` of the time that passes, until the next.
 
     Times are those of the strobe without trims, as a clock's bends have them: after minutes of the same trim they are
-    far from the camera's.
+    far from the camera's. Ten trims a second come for hours: what is asked of them costs the same after any number.
     """
 
     at_s: list[float] = field(default_factory=list)
     ppm: list[float] = field(default_factory=list)
+    _late_s: list[float] = field(default_factory=list)
 
     @property
     def now_ppm(self) -> float:
@@ -35,31 +37,32 @@ class Trims:
     def add(self, at_s: float, ppm: float) -> None:
         """Note a trim from a time of the camera on, which is not before the last."""
         without_s = self.without_s(at_s)
-        self.at_s.append(max(without_s, self.at_s[-1]) if self.at_s else without_s)
+        knot_s = max(without_s, self.at_s[-1]) if self.at_s else without_s
+        self._late_s.append(self._late_at_s(knot_s))
+        self.at_s.append(knot_s)
         self.ppm.append(ppm)
 
     def without_s(self, at_s: float) -> float:
         """Return at which time a flash that comes at ``at_s`` would have come without any trim."""
         without_s = at_s
         for _ in range(SETTLED):
-            without_s = at_s - float(self.late_s(np.array([without_s]))[0])
+            without_s = at_s - self._late_at_s(without_s)
         return without_s
 
     def late_s(self, time_s: FloatArray) -> FloatArray:
         """Return by how much flashes come later at times, same shape, than without any trim."""
-        late = np.zeros_like(time_s)
-        before = 0.0
-        for at_s, ppm in zip(self.at_s, self.ppm, strict=True):
-            late += 1e-6 * (ppm - before) * np.maximum(time_s - at_s, 0.0)
-            before = ppm
-        return late
+        return np.array([self._late_at_s(one_s) for one_s in time_s.ravel().tolist()]).reshape(time_s.shape)
+
+    def _late_at_s(self, time_s: float) -> float:
+        last = bisect_right(self.at_s, time_s) - 1
+        return 0.0 if last < 0 else self._late_s[last] + 1e-6 * self.ppm[last] * (time_s - self.at_s[last])
 
     def bent(self, clock: FoundClock, *, since_s: float) -> FoundClock:
         """Return a clock with the bends of all trims; those of trims that ended before a time of the camera are one
         slope."""
         if not self.at_s:
             return clock
-        first = int(np.searchsorted(self.at_s, self.without_s(since_s)))
+        first = bisect_left(self.at_s, self.without_s(since_s))
         recent = sorted({*self.at_s[max(first - 2, 0) :]})
         knots = np.array([recent[0] - TAIL_S, *recent, recent[-1] + TAIL_S])
         return replace(clock, knot_s=tuple(knots.tolist()), bend_s=tuple(self.late_s(knots).tolist()))

@@ -12,7 +12,7 @@ from psvideo.errors import PsvideoError
 from psvideo.strobe.link.lines import LONGEST_REPLY, Error, LineError, LineReader, TextLine
 from psvideo.strobe.link.protocol import format_request, parse_reply
 from psvideo.strobe.link.replies import ClockReading, Refusal, Reply
-from psvideo.strobe.link.requests import Arm, Clk, Request, Run, Stop
+from psvideo.strobe.link.requests import Arm, Clk, Request, Run, Stop, Trim
 from psvideo.strobe.link.words import Nonce
 
 REPLY_WITHIN_S = 0.5
@@ -157,7 +157,8 @@ class Link:
         return self._waiting.pop(0)
 
     def _refused(self, request: Request, refusal: Refusal) -> str:
+        left = "The trim before it counts on" if isinstance(request, Trim) else "The lights are dark"
         return (
             f"{self.port.name}: the controller refused {request.name}: {refusal.text or 'no reason given'} "
-            f"(E {refusal.code}). The lights are dark; lights/protocol.md says what the number means."
+            f"(E {refusal.code}). {left}; lights/protocol.md says what the number means."
         )
