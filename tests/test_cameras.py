@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -19,12 +20,13 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.clocks_json import format_clocks, read_clocks
 from psvideo.formats.plan_toml import format_plan, parse_plan, read_plan
 from psvideo.model.camera_clocks import CameraClock, CameraClocks
-from psvideo.model.marker import alike_turns, cycle_places
+from psvideo.model.marker import alike_turns, cycle_places, first_break
 from psvideo.model.maximal_length import TAPS, maximal_length
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
 from psvideo.runs.steps.output import rate_of
-from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.link.boards import BOARDS, Board, capabilities
+from psvideo.strobe.program import make_program
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 from psvideo.synth import shoot
 
@@ -186,6 +188,66 @@ def test_cameras_of_different_strobes_are_refused(make_plan: PlanMaker) -> None:
     guessed = CameraTake(plan=plan, timing=replace(first.timing, order="guess"))
     with pytest.raises(PsvideoError, match="is a guess"):
         camera_clocks([first, guessed])
+
+
+@pytest.mark.parametrize("board", BOARDS.values(), ids=lambda board: board.name)
+def test_a_plan_beside_a_boards_log_is_the_strobe_of_one_without(make_plan: PlanMaker, board: Board) -> None:
+    """A board plays whole ticks and the bursts nearest to a power; 1600 ticks of 0.5 us are not 0.0008 s in binary."""
+    whole = replace(make_plan(), dark_code=6)
+    powers = (1.0, 0.37, 1.0)
+    dimmed = tuple(
+        replace(flash, lights=dict.fromkeys(flash.lights, powers[n % 3]), duration_s=0.00081234 + 1e-7 * n)
+        for n, flash in enumerate(whole.flashes)
+    )
+    for plan in (whole, replace(whole, flashes=dimmed, dark_s=0.01012345)):
+        played = make_program(plan, capabilities(board, board.first_wiring)).played
+        assert played.flashes != plan.flashes or plan is whole
+        takes = [seen(plan, AT_FIRST, begin=0, count=200), seen(played, TRUE, begin=17, count=200)]
+        for pair in (takes, takes[::-1]):
+            found = camera_clocks(pair).cameras[1]
+            assert (found.first_flash, found.shared) == (17 if pair is takes else -17, 183)
+    ticks = tuple(replace(flash, duration_s=round(flash.duration_s / 5e-7) * 5e-7) for flash in whole.flashes)
+    logged = replace(whole, flashes=ticks)
+    assert logged.flashes != whole.flashes
+    camera_clocks([seen(whole, AT_FIRST, begin=0, count=200), seen(logged, TRUE, begin=0, count=200)])
+    for wrong in (
+        replace(logged, dark_s=logged.dark_s + 2e-6),
+        replace(logged, flashes=(replace(ticks[0], duration_s=ticks[0].duration_s + 2e-6), *ticks[1:])),
+        replace(logged, flashes=(replace(ticks[0], lights=dict.fromkeys(ticks[0].lights, 0.98)), *ticks[1:])),
+    ):
+        with pytest.raises(PsvideoError, match="strobe is not A's"):
+            camera_clocks([seen(whole, AT_FIRST, begin=0, count=200), seen(wrong, TRUE, begin=0, count=200)])
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_clip_whose_strobe_started_again_is_named_with_where_and_what_to_do(make_plan: PlanMaker, which: int) -> None:
+    plan = replace(make_plan(), dark_code=7)
+    takes = [seen(plan, AT_FIRST, begin=0, count=200), seen(plan, replace(TRUE, offset_s=-1.7), begin=5, count=200)]
+    left = [flash for flash in takes[which].timing.flashes if not 80 <= flash.index < 83]
+    flashes = tuple(replace(flash, index=n) for n, flash in enumerate(left))
+    last = int(left[79].start_s // plan.camera.frame_period_s)
+    broken = replace(takes[which].timing, flashes=flashes)
+    takes[which] = replace(takes[which], timing=broken)
+    with pytest.raises(PsvideoError, match=rf"{broken.clip}: its strobe started again.*folder of their own") as refusal:
+        camera_clocks(takes)
+    first, after = map(int, re.findall(r"between frames (\d+) and (\d+)", str(refusal.value))[0])
+    assert first <= last < after
+    assert after - first < 2 * 8 * 4, "a code may go on for some rounds as if nothing were amiss"
+    half = (flashes[:80], tuple(replace(flash, index=n) for n, flash in enumerate(flashes[80:])))
+    for part, begin in zip(half, (0, 83), strict=True):
+        takes[which] = replace(takes[which], timing=replace(broken, flashes=part))
+        assert camera_clocks(takes).cameras[1].first_flash == (5 + begin if which else 5 - begin)
+
+
+def test_the_first_break_is_where_no_place_in_the_cycle_fits(make_plan: PlanMaker) -> None:
+    plan = replace(make_plan(), dark_code=3)
+    cycle = plan.cycle_slots
+    for start, cut in itertools.product(range(len(cycle)), (1, 9, 30)):
+        slots = [cycle[(start + n) % len(cycle)] for n in range(60)]
+        assert first_break(plan, slots) is None
+        broken = slots[:cut] + slots[cut + 1 :]
+        fits = [n for n in range(len(broken) + 1) if cycle_places(plan, broken[:n])]
+        assert first_break(plan, broken) == (None if fits[-1] == len(broken) else fits[-1])
 
 
 SCENE = """

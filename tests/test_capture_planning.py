@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from psvideo.model.cost.shoot_figures import shoot_figures
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import row_weights
 from psvideo.runs.capture_plan import capture_plan
+from psvideo.strobe.link.boards import BOARDS
 
 
 def words(**given_words: object) -> ShootWords:
@@ -91,9 +93,32 @@ def test_row_weights_find_no_row_with_two_flashes_within_the_clocks_tolerance(cl
 
 
 def test_a_dark_slot_comes_about_twice_a_second_and_never_in_the_flicker_range() -> None:
-    for fps in ("24", "50", "119.88", "1000"):
+    for fps in ("24", "50", "119.88", "480"):
         figures = planned(fps=fps, readout="0.9ms", flash="0.1ms").figures
         assert 1.3 < figures.dark_slot_rate_hz <= 2.0
+
+
+@pytest.mark.parametrize("lights", ["a", "a,b", "a,b,c", "a,b,c,d,e", ",".join(f"l{n}" for n in range(130))])
+@pytest.mark.parametrize("fps", ["500", "600", "1000"])
+def test_every_board_plays_the_plan_of_a_fast_camera_whose_cycle_is_as_long_as_it_may_be(fps: str, lights: str) -> None:
+    fast = {"fps": fps, "readout": "0.9ms", "flash": "0.1ms", "lights": lights}
+    plan = planned(**fast).plan
+    count = len(plan.lights)
+    round_s = sum(plan.flashes[slot].duration_s + plan.dark_s for slot in plan.lit_slots)
+    for board in BOARDS.values():
+        assert len(plan.cycle_slots) <= board.steps
+    longer = replace(plan, dark_every=plan.dark_every + 1)
+    assert plan.dark_every * round_s > 0.5 or len(longer.cycle_slots) > min(board.steps for board in BOARDS.values())
+    most = (min(board.steps for board in BOARDS.values()) - 1) // count
+    assert planned(**fast, dark_every=most).plan.dark_every == most
+    with pytest.raises(UsageError, match=f"`dark_every` {most + 1}: .* flashes .*Give {most}"):
+        planned(**fast, dark_every=most + 1)
+
+
+def test_dark_slots_that_a_fast_cameras_board_cannot_make_rarer_are_warned_of() -> None:
+    figures = planned(fps="1000", readout="0.9ms", flash="0.1ms")
+    assert 3.0 < figures.figures.dark_slot_rate_hz < 4.0
+    assert "up to what a board holds" in text_of(figures, "flicker")
 
 
 def test_the_marker_is_a_dark_slot_a_longer_first_flash_or_nothing() -> None:
@@ -171,7 +196,8 @@ def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None
         ({"mode": "rolling-rate"}, "half-rate"),
         ({"marker": "bright"}, "dark, coded, long, none"),
         ({"dark_every": 0}, "--dark-every"),
-        ({"dark_every": 30_000}, "Give 1"),
+        ({"dark_every": 30_000}, "Give 79"),
+        ({"fps": "2", "dark_every": 41}, "in 61.6 s, and boards hold 240 flashes and play 60 s at most. Give 39 or"),
         ({"black": float("nan")}, "--black nan: expected a code value"),
         ({"white": float("inf")}, "--white inf: expected a code value"),
         ({"marker": "none", "dark_slot": "1ms"}, "--dark-slot"),
@@ -245,7 +271,7 @@ def test_flicker_is_named_for_what_flickers() -> None:
     assert "whole scene" not in text_of(by_light, "flicker")
     everything = planned(fps="50", flash="1ms")
     assert "The whole scene flickers at 45.7" in text_of(everything, "flicker")
-    nothing = planned(fps="1000", readout="0.9ms", flash="50us")
+    nothing = planned(fps="480", readout="1.9ms", flash="50us")
     assert "flicker" not in kinds(nothing)
     often = planned(fps="1000", readout="0.9ms", flash="50us", dark_every=6)
     assert "Dark slots come" in text_of(often, "flicker")

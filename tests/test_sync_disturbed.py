@@ -23,6 +23,7 @@ from psvideo.sync.find import find_timing
 from psvideo.sync.open_take import open_take
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.verdict.remarks import OF_MISNAMED_PPM
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -142,6 +143,14 @@ def test_a_misnamed_frame_rate_is_found_and_said(make_plan: PlanMaker) -> None:
     assert timing.frame_period_s == 1 / 120
     assert any("misnamed by 1.001" in note for note in timing.notes)
     assert not timing_of(plan, shot).notes
+
+
+def test_a_misnamed_rate_is_recognised_by_what_it_makes_of_the_strobes_period() -> None:
+    """A strobe of 12.5 ms spans 12.5e-3 * (true rate) frames, which the plan's rate takes for other seconds."""
+    exact, broadcast = Fraction(120), Fraction(120000, 1001)
+    for ppm, (true_fps, named_fps) in zip(OF_MISNAMED_PPM, ((broadcast, exact), (exact, broadcast)), strict=True):
+        seen_s = Fraction(125, 10000) * true_fps / named_fps
+        assert ppm == pytest.approx(float(1e6 * (seen_s / Fraction(125, 10000) - 1)), abs=1e-6)
 
 
 @pytest.mark.parametrize("hz", [100.0, 120.0])

@@ -65,7 +65,8 @@ def about_seizures(figures: ShootFigures) -> Iterator[Caution]:
             "flicker",
             f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, a flicker of the whole scene between "
             f"{low:g} and "
-            f"{high:g} Hz. {care} A larger `dark_every` makes them rarer; two a second are enough.",
+            f"{high:g} Hz. {care} A larger `dark_every` makes them rarer, up to what a board "
+            "holds; two a second are enough, and `marker` long needs none.",
         )
 
 

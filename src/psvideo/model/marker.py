@@ -59,6 +59,20 @@ def turned_slot(plan: Plan, slot: int, turn: int) -> int:
     return cycle[(cycle.index(slot) + turn) % len(cycle)]
 
 
+def first_break(plan: Plan, slots: Sequence[int]) -> int | None:
+    """Return the first of consecutive flashes that no place in the cycle puts behind those before; None: there is none.
+
+    Where rounds look alike it may be some flashes after the true break.
+    """
+    cycle = plan.cycle_slots
+    places = list(range(len(cycle)))
+    for number, slot in enumerate(slots):
+        places = [place for place in places if cycle[(place + number) % len(cycle)] == slot]
+        if not places:
+            return number
+    return None
+
+
 def cycle_places(plan: Plan, slots: Sequence[int]) -> tuple[int, ...]:
     """Return the places in the cycle, from 0, at which consecutive flashes of these slots may begin."""
     cycle = plan.cycle_slots

@@ -6,17 +6,18 @@ which they overlap. Where more than one is, nothing is chosen: the user must say
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 from psvideo.model.marker import cycle_places
-from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import MISNAMED_PPM, counted
 from psvideo.strobe.runlog import CAMERA_CLOCK_PPM
+from psvideo.sync.same_strobe import refuse_other_strobe, refuse_unnumbered
 
 LEAST_SHARED = 8
 """Flashes that two clips must share: a rate from fewer says nothing."""
@@ -27,9 +28,6 @@ LEAST_ERROR_S = 0.2e-6
 NEAR, HALF = 0.25, 0.5
 """A start that is given decides between cycles where it is off by less than the first share of one. Off by more than
 the second it is nearer to another one, even where the clips share flashes in this one only."""
-
-SAME_S = 1e-9
-"""Dark times that were computed may differ by this much and be the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,13 +42,13 @@ def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | No
     """Return the cameras' clocks against the first one's.
 
     ``starts_s`` says roughly when every clip began, on any one clock: it decides where the marker leaves several whole
-    cycles possible. Raises PsvideoError where the cameras saw different strobes, where clips share too few flashes, and
-    where which flashes they share is not known.
+    cycles possible. Raises PsvideoError where the cameras saw different strobes, where a clip's strobe
+    started again, where clips share too few flashes, and where which flashes they share is not known.
     """
     first = takes[0]
     for take in takes:
-        _refuse_other_plan(first, take)
-        _refuse_guess(take.timing)
+        refuse_other_strobe((first.plan, first.timing), (take.plan, take.timing))
+        refuse_unnumbered(take.plan, take.timing)
     cycle_s = first.plan.cycle_s
     cameras, decided, notes = [], True, []
     for k, take in enumerate(takes):
@@ -68,44 +66,6 @@ def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | No
         first_instant_s=first.plan.camera.middle_s,
         notes=tuple(notes),
     )
-
-
-def _refuse_other_plan(first: CameraTake, take: CameraTake) -> None:
-    one, other = (replace(each.plan, camera=first.plan.camera, clock_tolerance_ppm=None) for each in (first, take))
-    if abs(one.dark_s - other.dark_s) > SAME_S or replace(one, dark_s=other.dark_s) != other:
-        raise PsvideoError(
-            f"{take.timing.clip}: its plan's strobe is not {first.timing.clip}'s: expected "
-            f"{_first_difference(one, other)}, as one strobe played both. Put the plan that was played beside every "
-            "clip, with each camera's own [camera] table and dark_s written out."
-        )
-
-
-def _first_difference(one: Plan, other: Plan) -> str:
-    """Return what of the first plan's strobe another plan has otherwise, and what was found in that."""
-    if len(one.flashes) != len(other.flashes):
-        return f"a round of {counted(len(one.flashes), 'flash')}, found {len(other.flashes)}"
-    for number, (first, found) in enumerate(zip(one.flashes, other.flashes, strict=True), 1):
-        if first.lights != found.lights:
-            return f"{_lit_words(first)} in flash {number} of the round, found {_lit_words(found)}"
-        if first.duration_s != found.duration_s:
-            return f"{first.duration_s * 1e3:.6g} ms of flash {number}, found {found.duration_s * 1e3:.6g} ms"
-    if abs(one.dark_s - other.dark_s) > SAME_S:
-        return f"a dark time of {one.dark_s * 1e3:.6g} ms, found {other.dark_s * 1e3:.6g} ms"
-    return "the same mode, dark slots, and rise and fall times"
-
-
-def _lit_words(flash: PlannedFlash) -> str:
-    return (
-        " + ".join(light if power == 1 else f"{light} at {power:g}" for light, power in flash.lights.items()) or "dark"
-    )
-
-
-def _refuse_guess(timing: Timing) -> None:
-    if timing.order == "guess":
-        raise PsvideoError(
-            f"{timing.clip}: which flash is which is a guess, as the plan has no marker, so nothing says which flashes "
-            "two cameras share. Plan with a coded marker (`marker` coded)."
-        )
 
 
 def _slots(timing: Timing) -> list[int]:

@@ -53,7 +53,9 @@ class ShootWords:
         ),
     ] = None
     dark_slot: Annotated[str | None, _option(STROBE, "The dark slot's duration; default: the shortest flash's.")] = None
-    dark_every: Annotated[int | None, _option(STROBE, "A dark slot in every Nth round; default: two a second.")] = None
+    dark_every: Annotated[
+        int | None, _option(STROBE, "A dark slot in every Nth round; default: two a second, or what a board holds.")
+    ] = None
     dark: Annotated[str | None, _option(STROBE, "Dark time between flashes; default: exposure and margin.")] = None
     strobe_clock_ppm: Annotated[str, _option(STROBE, "Tolerance of the strobe's clock in ppm, or unknown.")] = "50"
     transfer: Annotated[

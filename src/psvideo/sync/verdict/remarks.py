@@ -10,13 +10,14 @@ from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS
-from psvideo.model.units import show_seconds
+from psvideo.model.units import NTSC, show_seconds
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import brightnesses, predictions
 
-OF_MISNAMED_PPM = (-1000.0, 999.0)
-"""Clock offsets that a frame rate misnamed by 1.001 leaves: 120 for 119.88, and 119.88 for 120."""
+OF_MISNAMED_PPM = (1e6 * (float(NTSC) - 1.0), 1e6 * (1.0 / float(NTSC) - 1.0))
+"""Clock offsets that a frame rate misnamed by 1.001 leaves: -999 ppm for a plan of 120 and footage of 119.88, +1000 ppm
+the other way round."""
 NEAR_PPM = 150.0
 CHANGED, GROSS = 1e-3, 0.08
 """Shares by which an exposure or a readout must be off to be worth a word, and to make the plan's value a mistake."""

@@ -1,0 +1,84 @@
+"""Whether cameras' plans tell of one strobe, and whether a clip's flashes can be found in it.
+
+A plan beside a log of the board has what was played: whole ticks, and powers as bursts gave them. One without has what
+was asked for. Both are the same strobe's.
+"""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import replace
+
+from psvideo.errors import PsvideoError
+from psvideo.model.marker import cycle_places, first_break
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.timing import Timing
+from psvideo.model.units import counted
+from psvideo.strobe.bursts import POWER_TOLERANCE
+from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.program import PS_PER_S
+
+SAME_S = max(board.tick_ps for board in BOARDS.values()) / PS_PER_S
+"""Times that differ by no more than a board's longest tick are the same: what was asked for, and what was played."""
+
+
+def refuse_other_strobe(first: tuple[Plan, Timing], other: tuple[Plan, Timing]) -> None:
+    """Raise PsvideoError where a plan's strobe is not the first one's."""
+    difference = _first_difference(first[0], other[0])
+    if difference:
+        raise PsvideoError(
+            f"{other[1].clip}: its plan's strobe is not {first[1].clip}'s: expected {difference}, as one strobe played "
+            "both. Put the plan that was played beside every clip, with each camera's own [camera] table and dark_s "
+            "written out."
+        )
+
+
+def refuse_unnumbered(plan: Plan, timing: Timing) -> None:
+    """Raise PsvideoError where the numbers of a clip's flashes are a guess, or do not follow one another."""
+    if timing.order == "guess":
+        raise PsvideoError(
+            f"{timing.clip}: which flash is which is a guess, as the plan has no marker, so nothing says which flashes "
+            "two cameras share. Plan with a coded marker (`marker` coded)."
+        )
+    slots = [flash.slot for flash in timing.flashes]
+    last = first_break(plan, slots)
+    if last is not None:
+        first = min(last, bisect_left(range(len(slots)), 1, key=lambda n: len(cycle_places(plan, slots[n:])) > 0))
+        frames = [max(0, int(timing.flashes[n].start_s // timing.frame_period_s)) for n in (first - 1, last)]
+        raise PsvideoError(
+            f"{timing.clip}: its strobe started again, or skipped flashes, between frames {frames[0]} and {frames[1]}: "
+            "the flashes do not follow one another there as in the strobe's cycle, so which ones two cameras share "
+            "is not known across it. Put the frames before, or those after, into a folder of their own with the plan "
+            "beside them, and name that folder."
+        )
+
+
+def _first_difference(one: Plan, other: Plan) -> str:
+    """Return what of the first plan's strobe another plan has otherwise, and what was found in that; else ''."""
+    if len(one.flashes) != len(other.flashes):
+        return f"a round of {counted(len(one.flashes), 'flash')}, found {len(other.flashes)}"
+    for number, (first, found) in enumerate(zip(one.flashes, other.flashes, strict=True), 1):
+        if not _same_lights(first, found):
+            return f"{_lit_words(first)} in flash {number} of the round, found {_lit_words(found)}"
+        if not _same_s(first.duration_s, found.duration_s):
+            return f"{first.duration_s * 1e3:.6g} ms of flash {number}, found {found.duration_s * 1e3:.6g} ms"
+    if not _same_s(one.dark_s, other.dark_s):
+        return f"a dark time of {one.dark_s * 1e3:.6g} ms, found {other.dark_s * 1e3:.6g} ms"
+    rest = replace(other, camera=one.camera, clock_tolerance_ppm=one.clock_tolerance_ppm)
+    if replace(rest, flashes=one.flashes, dark_s=one.dark_s) != one:
+        return "the same mode, dark slots, and rise and fall times"
+    return ""
+
+
+def _same_s(one_s: float, other_s: float) -> bool:
+    return abs(one_s - other_s) < SAME_S * (1 + 1e-6)
+
+
+def _same_lights(one: PlannedFlash, other: PlannedFlash) -> bool:
+    """Return whether two flashes light the same lamps with powers of which one was played for the other."""
+    pairs = [(one.lights.get(name, 0.0), other.lights.get(name, 0.0)) for name in {*one.lights, *other.lights}]
+    return all(abs(a - b) <= POWER_TOLERANCE * min(a, b) / (1 - POWER_TOLERANCE) for a, b in pairs)
+
+
+def _lit_words(flash: PlannedFlash) -> str:
+    lit: Sequence[str] = [light if power == 1 else f"{light} at {power:g}" for light, power in flash.lights.items()]
+    return " + ".join(lit) or "dark"
