@@ -176,6 +176,22 @@ def test_a_light_that_did_not_fire_is_named(make_plan: PlanMaker) -> None:
     assert not timing_of(plan, filmed(plan, factors={2: 0.1})).notes
 
 
+@pytest.mark.parametrize(("dark_s", "in_step"), [(1.0001e-3, True), (1.237e-3, False)])
+def test_lights_that_a_closed_shutter_misses_are_not_said_to_have_failed(
+    make_plan: PlanMaker, dark_s: float, in_step: bool
+) -> None:
+    """Four slots of 1.5 ms before a global shutter open for 1 ms of every 10 ms: five rounds last three frames, so
+    that all flashes fall at five places of the frame. With another dark time only a lamp that is dead stays dark."""
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, readout=0.0, shutter=0.1, fps=Fraction(100))
+    flashes = tuple(replace(flash, duration_s=0.5e-3) for flash in plan.flashes)
+    plan = replace(plan, flashes=flashes, dark_s=dark_s)
+    dead = {} if in_step else {1: 0.0}
+    profiles = filmed(plan, frames=200, phase_s=0.512 * plan.cycle_s, factors=dead)
+    said = [note for note in timing_of(plan, profiles).notes if "no light is seen" in note]
+    assert len(said) == 1
+    assert ("keeps step with the frames" in said[0], "Check that it fires" in said[0]) == (in_step, not in_step)
+
+
 def test_lights_that_all_flash_at_once_are_recognised(plan: Plan) -> None:
     assert any("flash together" in note for note in timing_of(plan, filmed(plan, together=True)).notes)
 

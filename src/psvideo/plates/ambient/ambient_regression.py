@@ -44,7 +44,6 @@ MOVED = 4.0
 """A block moved whose residuals are this many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
 """Residuals of less than this, and this share of the block's light, are no motion, however little noise there is."""
-"""Small pictures' light from which on a block may hold clipped samples."""
 WINDOW_PX = 5
 """Detail of the ambient picture is judged against its noise over windows of this width (Lee 1980)."""
 AROUND_BLOCKS = 3.0

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.cost.in_step import IN_STEP, never_shown
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS
@@ -215,6 +216,15 @@ def _sureness(plan: Plan, found: ClipFit) -> str:
     return ""
 
 
+def _missed_share(plan: Plan, found: ClipFit, beat: Beat) -> float:
+    """Return the share of the rows that see a light in no round of the clip, in the mean over lights: 0 where the
+    shutter is open all the time, or flashes come at other places in the frame from round to round."""
+    start_s = found.rows.frame_start_s
+    as_found = replace(plan, camera=replace(plan.camera, exposure_s=beat.exposure_s))
+    lasts_s = float(start_s[-1] - start_s[0]) + found.rows.period_s
+    return never_shown(as_found, lasts_s=lasts_s, clock_offset_ppm=beat.clock.mean_offset_ppm())
+
+
 def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) -> tuple[str, ...]:
     """Return sentences on lights that seem not to have fired, or all at once.
 
@@ -230,10 +240,15 @@ def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) ->
     if off:
         dark = ", ".join(dict.fromkeys("+".join(plan.flashes[slot].lit) for slot in off))
         unless = "" if named else " If the order guessed here is not the true one, it is another light."
-        return (
-            f"{dark}: no light is seen from there, less than {100 * UNFIRED:.0f} % of the brightest. Check that it "
-            f"fires, and that it reaches what the camera sees.{unless}",
-        )
+        told = f"{dark}: no light is seen from there, less than {100 * UNFIRED:.0f} % of the brightest."
+        missed = _missed_share(plan, found, beat)
+        if missed > IN_STEP:
+            return (
+                f"{told} These lights may fire unseen: the strobe keeps step with the frames, and the closed shutter "
+                f"misses {100 * missed:.0f} % of the rows' flashes in every round of this clip. Then times are known "
+                f"less well than is said. Plan another dark time (`dark_s`), or open the shutter longer.{unless}",
+            )
+        return (f"{told} Check that it fires, and that it reaches what the camera sees.{unless}",)
     if len({frozenset(plan.flashes[slot].lit) for slot in lit}) < LEAST_LIGHTS:
         return ()
     if any(len(plan.flashes[slot].lit) > 1 for slot in lit):
