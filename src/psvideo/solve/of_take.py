@@ -87,10 +87,11 @@ def solve(
     plan, clip = take.plan, take.clip
     lights = lights_as_planned(rig, plan)
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
-    aligning, masks = Aligning(align=align), None if mask is None else Masks(still=mask)
+    how = Aligning(align=align, lights=() if unmixing else lights)
+    masks = None if mask is None else Masks(still=mask)
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
     if solving.looks_at_subject(len(lights)):
-        few = rounds_spread(take, found, aligning=aligning, watch=watch)
+        few = rounds_spread(take, found, aligning=how, watch=watch)
         solving = replace(solving, subject=subject_of(few, plan, rig, masks=masks, solving=solving, near=near))
-    rounds = gather(take, found, aligning=aligning, with_ambient=False, watch=watch)
+    rounds = gather(take, found, aligning=how, with_ambient=False, watch=watch)
     return surfaces(rounds, plan, rig, masks=masks, solving=solving, near=near)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
@@ -70,7 +71,7 @@ class Held:
     is the round that plates come of, ``whole`` the last one that was complete (None before any was), and ``middle_s``
     its middle. ``motion`` says by light and round what was compared with the round before, and where it had moved;
     ``drift`` where it had since the ``first`` sketch of a light in a block of rounds that are pooled. ``put_by`` takes
-    codes of packed plates.
+    codes of packed plates. ``lamps`` is how the lights shine, None where that is not known.
     """
 
     lights: tuple[str, ...]
@@ -80,6 +81,7 @@ class Held:
     with_ambient: bool
     whites: dict[str, float] = field(default_factory=dict)
     put_by: PutBy | None = None
+    lamps: Lamps | None = None
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
     waiting: deque[DueInstant] = field(default_factory=deque)
     ambient: dict[int, LightPlate] = field(default_factory=dict)

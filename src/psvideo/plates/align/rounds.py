@@ -10,6 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.model.choices import Align, Rate
+from psvideo.model.rig import Light
+from psvideo.plates.align.as_they_are import (
+    BothWays,
+    Lamps,
+    fits_as_it_is,
+    left_as_it_is,
+    nearest_of,
+    seen_by_all,
+)
 from psvideo.plates.align.between import Ends, plate_at
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
@@ -18,7 +27,7 @@ from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
 from psvideo.plates.align.velocity.brightness import evened
-from psvideo.plates.align.velocity.flow import Codes, Vectors
+from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.align.velocity.moving_kernel import NOWHERE
@@ -31,10 +40,18 @@ class Aligning:
     """How plates are brought to one instant. ``auto`` looks for flow between plates that differ by more than noise.
 
     ``rate`` says which instants are shown: the middle of every round's flashes, every flash, or those of a steady rate.
+    ``lights`` are those of the plates where it is known how they shine: four and more tell where plates as they are
+    show one surface, and plates brought to the instant do not.
     """
 
     align: Align = "auto"
     rate: Rate | Comb = "round"
+    lights: tuple[Light, ...] = ()
+
+    @property
+    def leaves_plates(self) -> bool:
+        """Whether complete rounds are shown, their plates as they are."""
+        return self.align == "none" and self.rate == "round"
 
 
 UNMOVED = Aligning(align="none")
@@ -63,7 +80,7 @@ def aligned(
     plates, where ``plates`` begin later; what it lacks is put in. ``put_by`` takes the codes of plates that were moved;
     without it they lie in memory.
     """
-    if how == UNMOVED:
+    if how.leaves_plates:
         return gathered(
             plates, lights, expected=lambda _: {*lights, AMBIENT} if with_ambient else {*lights}, whole=True
         )
@@ -75,6 +92,7 @@ def aligned(
         with_ambient=with_ambient,
         whites={} if whites is None else whites,
         put_by=put_by,
+        lamps=Lamps.of(how.lights, lights),
     )
     return _slid(plates, held, how, first, schedule)
 
@@ -178,12 +196,35 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     unknown = np.zeros_like(motion.moves)
     if not instant.guessed:
         sources, unknown = without_doubtful(shown, motion, len(held.lights) - len(lights))
+        still = _fitting_as_they_are(held, instant, dict(zip(lights, pairs, strict=True)), shown)
+        if still.any():
+            instant.motion = motion = motion.without(still)
+            shown = [left_as_it_is(one, pair, motion, still) for one, pair in zip(shown, pairs, strict=True)]
+            sources = [np.where(still, one.source, own) for one, own in zip(shown, sources, strict=True)]
+            guesses = [one.source for one in shown]
     instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
     instant.unsure[:, unknown] = UNKNOWN
     for light, source, guess in zip(lights, sources, guesses, strict=True):
         _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion, held.put_by))
         instant.moving.remove(light)
         held.let_go()
+
+
+def _fitting_as_they_are(held: Held, instant: DueInstant, pairs: dict[str, Pair], shown: Sequence[Taken]) -> Flags:
+    """Return where plates as they are show one surface, and those that are taken do not; nowhere where the lights do
+    not tell."""
+    if held.lamps is None or instant.motion is None:
+        return np.zeros((1, 1), np.bool_)
+    ways, motion = dict(zip(pairs, shown, strict=True)), instant.motion
+    both = []
+    for light in held.lights:
+        if light in ways:
+            both.append(BothWays(rest=nearest_of(pairs[light], motion), moved=ways[light].shows))
+        elif (sketch := held.shots[light][instant.round].sketch) is not None:
+            both.append(BothWays.standing(InstantSketch.standing(sketch, motion.moves.shape)))
+    if len(both) < len(held.lights):
+        return np.zeros((1, 1), np.bool_)
+    return fits_as_it_is(held.lamps, both) & seen_by_all([*pairs.values()], motion)
 
 
 def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes]) -> Vectors:

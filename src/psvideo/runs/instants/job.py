@@ -12,6 +12,7 @@ from psvideo.errors import UsageError
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.sequences.tags import Tags
 from psvideo.model.choices import Solver
+from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.plan import Plan
 from psvideo.model.surface import Subject
 from psvideo.model.timing import Timing
@@ -84,6 +85,14 @@ class Job:
             fill=self.fill,
             subject=self.subject,
         )
+
+    @property
+    def aligning(self) -> Aligning:
+        """How plates are brought to one instant, by lights whose place is known."""
+        how = self.over_time.aligning
+        if self.take.unmixing is not None:
+            return how
+        return replace(how, lights=lights_as_planned(self.lighting.rig, self.take.plan))
 
     @property
     def asked(self) -> AskedPasses:

@@ -110,7 +110,7 @@ def instants_of(
     rounds = gather(
         job.take,
         job.timing,
-        aligning=job.over_time.aligning,
+        aligning=job.aligning,
         with_ambient=job.mixes_ambient or job.delivery.plates,
         start_number=job.start_number,
         part=part,
@@ -135,7 +135,7 @@ def instants_of(
 def knowing_subject(job: Job, *, spare: Path | None = None, watch: Watch = unwatched) -> Job:
     """Return the job with what its rounds share of their subject, unless that is known or nothing would use it: found
     from a few rounds that are spread over the take, whichever part of it is solved. Decodes their frames."""
-    take, aligning = job.take, job.over_time.aligning
+    take, aligning = job.take, job.aligning
     if job.subject is not None or not job.solving.looks_at_subject(len(take.plan.lights)):
         return job
     rounds = rounds_spread(take, job.timing, aligning=aligning, start_number=job.start_number, watch=watch)

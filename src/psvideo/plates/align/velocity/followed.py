@@ -1,7 +1,7 @@
 """What is followed, and what comes of it: plates of a light in pairs, and one velocity for every pixel."""
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -39,6 +39,10 @@ class Followed:
         of_label = np.zeros((2, int(labels.max()) + 1), np.float32)
         of_label[:, labels[self.moves]] = self.velocity[:, self.moves]
         return of_label[:, labels]
+
+    def without(self, still: Flags) -> "Followed":
+        """Return the same with nothing that moves where ``still`` (row, col)."""
+        return replace(self, velocity=self.velocity * ~still, moves=self.moves & ~still)
 
     def way(self, span_s: float) -> Vectors:
         """Return how far every pixel goes in a time, shape (2, row, col)."""

@@ -1,0 +1,118 @@
+"""Where plates as they are show one surface, and plates brought to an instant do not: nothing is moved there.
+
+Flow that fits by chance, and a blend of two plates between which an edge passed, turn normals. Of four lights and more
+one normal and one albedo tell: they explain the plates of all lights where these show the same surface.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.threads import over_ranges
+from psvideo.model.rig import Light, directions
+from psvideo.plates.align.as_they_are_kernel import SOLVED, leave_rows
+from psvideo.plates.align.doubt.lone_edges import InstantSketch
+from psvideo.plates.align.doubt.unsure import unsure_of
+from psvideo.plates.align.taken import Taken
+from psvideo.plates.align.velocity.brightness import EVERY_CODE, SCALE, light_of
+from psvideo.plates.align.velocity.flow import TOE, Flags, comparable
+from psvideo.plates.align.velocity.followed import Followed, Pair
+from psvideo.plates.align.velocity.moving_kernel import AT_REST
+
+LEFT = np.float32(0.5)
+"""Plates as they are must leave less than this share of what moved ones leave, beyond what is usual."""
+MATTE = 0.03
+"""Surfaces that stand still leave this share of their albedo: they are not quite matte, and rigs are a little off."""
+WINDOW_PX, AROUND_PX = 3, 7
+"""What is left is compared over the first; most of what lies within the second must agree."""
+LEAST_LIT = 0.03
+"""What shows less light, as a share of white, is in shadow."""
+BAND_PIXELS = 1 << 15
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lamps:
+    """The distant lights of plates: ``matrix`` (light, 3), directions times strengths, by ``names``."""
+
+    names: tuple[str, ...]
+    matrix: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, lights: Sequence[Light], names: Sequence[str]) -> "Lamps | None":
+        """Return the lamps of plates with these names, None where they are not known as distant, or too few to tell."""
+        known = {light.name: light for light in lights if light.direction is not None}
+        if len(names) <= SOLVED or any(name not in known for name in names):
+            return None
+        chosen = [known[name] for name in names]
+        strengths = np.array([np.mean(light.by_channel) for light in chosen])
+        return cls(names=tuple(names), matrix=directions(chosen) * strengths[:, None])
+
+
+@dataclass(frozen=True, kw_only=True)
+class BothWays:
+    """A light's sketches at an instant: of the plate as it is, and of what was brought to the instant."""
+
+    rest: InstantSketch
+    moved: InstantSketch
+
+    @classmethod
+    def standing(cls, sketch: InstantSketch) -> "BothWays":
+        """Return those of a light under which nothing moved."""
+        return cls(rest=sketch, moved=sketch)
+
+
+def nearest_of(pair: Pair, motion: Followed) -> InstantSketch:
+    """Return what the nearer plate of a pair shows as it is, on the velocities' grid."""
+    since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
+    nearer = pair.before if since_s <= until_s else pair.after
+    return InstantSketch.standing(nearer, motion.moves.shape)
+
+
+def fits_as_it_is(lamps: Lamps, lights: Sequence[BothWays]) -> Flags:
+    """Return where one surface explains the plates as they are, and not those brought to the instant, (row, col).
+    ``lights`` come in the order of the lamps."""
+    rest, moved = (np.stack([getattr(one, way).codes for one in lights]) for way in ("rest", "moved"))
+    whites = np.array([one.rest.white for one in lights])
+    light = light_of(EVERY_CODE).astype(np.float64) * whites[:, None]
+    noise = max(one.moved.noise for one in lights) / np.sqrt(2)
+    variance = (2 * noise / SCALE) ** 2
+    floor = LEAST_LIT * whites.max() / np.linalg.norm(lamps.matrix, axis=1).mean()
+    factors = np.array([MATTE**2, 2 * variance * whites.mean(), 2 * variance * TOE * whites.mean() ** 2, floor])
+    left = np.empty((3, *rest.shape[1:]), np.float32)
+
+    def run(first: int, last: int) -> None:
+        leave_rows(rest, moved, light, lamps.matrix, LEAST_LIT * whites, factors, first, last, left)
+
+    over_ranges(run, left.shape[1], each=max(BAND_PIXELS // left.shape[2], 1))
+    own, theirs, usual = (cv2.blur(plane, (WINDOW_PX, WINDOW_PX)) for plane in left)
+    fits = own < LEFT * theirs - usual
+    share = cv2.blur(fits.astype(np.float32), (AROUND_PX, AROUND_PX))
+    return np.asarray(share > np.float32(0.5))
+
+
+def left_as_it_is(one: Taken, pair: Pair, motion: Followed, still: Flags) -> Taken:
+    """Return what is taken of a light's plates with its nearer plate as it is where ``still``; ``motion`` no longer
+    moves there."""
+    two, shape = comparable(pair.before, pair.after), motion.moves.shape[::-1]
+    before, after = (np.asarray(cv2.resize(codes, shape, interpolation=cv2.INTER_AREA), np.uint8) for codes in two)
+    unsure = unsure_of(pair, before, after, motion, one.shows.noise)
+    codes = np.where(still, nearest_of(pair, motion).codes, one.shows.codes)
+    return replace(
+        one,
+        source=np.where(still, np.uint8(AT_REST), one.source),
+        unsure=np.where(still, unsure, one.unsure),
+        shows=replace(one.shows, codes=codes),
+    )
+
+
+def seen_by_all(pairs: Sequence[Pair], motion: Followed) -> Flags:
+    """Return which rows of the velocities the nearer plates of all lights show, (row, 1)."""
+    seen = np.ones(motion.moves.shape[0], np.bool_)
+    for pair in pairs:
+        since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
+        rows = (pair.before if since_s <= until_s else pair.after).seen
+        seen &= rows[: motion.step * len(seen)].reshape(len(seen), -1).all(axis=1)
+    return seen[:, None]
