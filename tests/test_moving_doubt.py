@@ -154,8 +154,8 @@ def test_what_looks_torn_is_a_crease_where_one_normal_explains_the_plates_of_fiv
 def test_normals_on_either_side_of_what_moves_are_torn_and_say_little_where_plates_agree() -> None:
     known, torn = (np.full((SIDE, SIDE), value, np.float32) for value in (1.0, 0.0))
     torn[:, 46:50] = 9.0
-    beside, elsewhere = np.zeros((2, SIDE, SIDE), np.bool_)
-    beside[:, 48:] = elsewhere[:, 56:] = True
+    beside, within, elsewhere = np.zeros((3, SIDE, SIDE), np.bool_)
+    beside[:, 48:] = within[:, 41:] = elsewhere[:, 56:] = True
 
     def torn_doubt(turned_deg: float, moves: np.ndarray) -> np.ndarray:
         turned = np.full((SIDE, SIDE), turned_deg, np.float32)
@@ -163,7 +163,8 @@ def test_normals_on_either_side_of_what_moves_are_torn_and_say_little_where_plat
         return np.asarray((moving_doubt_deg(turned, torn, known, moves) - plain)[48], np.float32)
 
     most = 9 - HOW.least_torn_deg
-    assert torn_doubt(0.1, beside)[48] < torn_doubt(0.1, elsewhere)[48] - 0.7 * most
+    for turned_deg, moves in ((0.1, beside), (0.9, beside), (0.1, within)):
+        assert torn_doubt(turned_deg, moves)[48] < torn_doubt(turned_deg, elsewhere)[48] - 0.7 * most
     assert torn_doubt(2.0, beside)[48] == pytest.approx(torn_doubt(2.0, elsewhere)[48], abs=0.1)
     assert torn_doubt(0.1, beside)[47] >= most, "what it comes from behind"
 

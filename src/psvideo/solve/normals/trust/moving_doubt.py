@@ -25,7 +25,7 @@ EXPLAINED = np.float32(0.05)
 MOST_ODDS, LEAST = np.float32(30), np.float32(1e-6)
 MOST_CHECKS = 2
 """More lights than this beyond three say no more of what is around."""
-OUTLINE = (11, 11)
+OUTLINE = (17, 17)
 """Normals on either side of an outline are called torn over this many points."""
 NOISELESS = PlateNoise(read=0.0, photon=0.0)
 
@@ -41,8 +41,8 @@ class MovingDoubt:
     torn, least_torn_deg: how much of the angle counts by which normals belong to no surface, beyond what creases and
         outlines of a painted bust at rest make of it; less where one normal explains the plates of more than three
         lights, for there it is a crease.
-    outline: how much of that counts just within the outlines of what moves, where plates agree along the motion:
-        normals of two surfaces are torn anyway.
+    outline, agreed_deg: how much of that counts just within the outlines of what moves, where plates agree along the
+        motion, turning a normal by less than such an angle: normals of two surfaces are torn anyway.
     torn_around, least_around_deg, torn_around_deg: and of its mean over a square of such a share, beyond the first, the
         square over the second: what is wrong throughout (blades, a checker) is hardly torn in the middle of a facet.
     near, stirring_deg, stirring_share: all of that where anything stirs: motion turns at least such a share of a square
@@ -59,6 +59,7 @@ class MovingDoubt:
     around: float = 0.1
     torn: float = 1.0
     outline: float = 0.25
+    agreed_deg: float = 1.0
     least_torn_deg: float = 3.0
     least_around_deg: float = 2.0
     torn_around: float = 0.15
@@ -175,7 +176,7 @@ def _torn_doubt(
     around = cv2.blur(torn_deg * known, size) / np.maximum(cv2.blur(known, size), np.float32(1e-6))
     own = np.maximum(torn_deg - np.float32(how.least_torn_deg), 0)
     around = np.maximum(around - np.float32(how.least_around_deg), 0)
-    agreed = _on_outline(moves) & (turned_deg < how.stirring_deg)
+    agreed = _on_outline(moves) & (turned_deg < how.agreed_deg)
     own *= np.where(agreed, np.float32(how.outline), 1)
     if check is not None:
         own *= check.puzzling
