@@ -3,7 +3,8 @@
 ``rounds`` does it, plate by plate while a clip is read: begin there. ``comb`` lists the instants that are wanted.
 ``held`` keeps sketches and plates (``packed`` into 16 bits, by ``pack_kernel``) for as long as an instant may need
 them. ``between`` makes a light's plate at an instant from the two plates around it (its loop is in ``blend_kernel``);
-``taken`` decides which of the two each pixel comes from.
+``taken`` decides which of the two each pixel comes from, and ``as_they_are`` (loop in ``as_they_are_kernel``) where
+nothing is to be moved, since only plates as they are show one surface.
 
 Rooms, from the bottom up:
 
