@@ -19,9 +19,13 @@ from filmed import filmed
 from picture_file import read_picture
 
 from psvideo.cli.app import main
+from psvideo.clip import Take
+from psvideo.errors import NoStrobeError
+from psvideo.model.timing import Timing
 from psvideo.report.observe.focus import sharpest_blur_px
 from psvideo.runs.many_takes.arriving import takes_in, whole_takes
 from psvideo.runs.steps.checked import Check
+from psvideo.sync.take_timing import find_take_timing
 
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
 SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")
@@ -95,6 +99,27 @@ def test_lights_that_did_not_flash_are_a_strobe_that_is_not_seen(
     out = capsys.readouterr().out
     assert re.search(r"bad +strobe", out)
     assert re.search(r"(good|bad) +exposure", out)
+
+
+def test_more_frames_are_looked_at_before_a_strobe_is_said_to_be_missing(
+    shot: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = list[int]()
+
+    def only_in_many(take: Take, **others: Any) -> Timing:
+        asked.append(len(take.numbers))
+        if len(asked) == 1:
+            raise NoStrobeError("no strobe in so few")
+        return find_take_timing(take, **others)
+
+    monkeypatch.setattr("psvideo.runs.check.find_take_timing", only_in_many)
+    monkeypatch.setattr("psvideo.runs.check.LEAST_FRAMES", 1)
+    monkeypatch.setattr("psvideo.runs.check.ROUNDS", 2)
+    assert run("check", shot("good"), "--json") == 0
+    checked = json.loads(capsys.readouterr().out)
+    assert len(asked) == 2
+    assert asked[0] < asked[1] <= 2 * asked[0]
+    assert asked[1] <= checked["looked_at"] <= checked["frames"]
 
 
 def test_the_blur_of_sharp_shapes_is_reported_and_that_of_noise_is_not() -> None:

@@ -72,6 +72,7 @@ def off_rows(plan: Plan, timing: Timing, fired: tuple[TrueFlash, ...], frames: i
         pytest.param(5, 0.25, 1.0, 54, 22.73, 22.96, 2, id="hole"),
         pytest.param(4, 0.5, 0.6, 60, 25.48, 40.63, 2, id="dark"),
         pytest.param(3, 1.0, 1.0, 57, 33.1, 35.97, 1, id="hole-and-repeats"),
+        pytest.param(3, 0.25, 0.6, 60, 42.96, 43.61, 1, id="between-two-exposures"),
     ],
 )
 def test_flashes_beside_a_break_are_complete_only_where_they_fired(
@@ -128,3 +129,17 @@ def test_a_strobe_that_moves_by_many_frames_and_a_little_started_again(
         assert np.abs(complete_s[:, None] - own_s).min(axis=1).max() < 0.02 * plan.shortest_flash_s
     else:
         assert [hole.count for hole in timing.dropped_frames] == [many]
+
+
+@pytest.mark.parametrize(("frames", "stops"), [(36, 30.2), (36, 33.2), (60, 30.2)])
+def test_a_strobe_that_stops_within_a_frame_leaves_no_missing_frames(
+    frames: int, stops: float, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(height_px=48, width_px=12, lights=tuple("abcd"))
+    _, profiles = broken_off(plan, 3, frames=frames, stops=stops, begins=frames + 9.0)
+    timing = find_timing(plan, np.arange(frames), profiles)
+    assert not timing.dropped_frames
+    assert not timing.repeated_frames
+    last_s = max(one.start_s for one in timing.flashes if one.complete and one.lights)
+    assert (stops - 3) * plan.camera.frame_period_s < last_s < stops * plan.camera.frame_period_s
+    assert any("it had not begun or had stopped" in note for note in timing.notes)

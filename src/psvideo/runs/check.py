@@ -4,7 +4,7 @@ import math
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,6 +40,8 @@ from psvideo.sync.take_timing import find_take_timing
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4
 """This many rounds are looked at, where the clip is long enough."""
+WIDER = 2
+"""So many times as many where these show no strobe."""
 SPREAD = 6
 """More frames, over the rest of the take: whether light and exposure stay."""
 EXPOSED_FRAMES, EARLY_FRAMES = 12, 16
@@ -129,7 +131,7 @@ def judged_take(
     with _store(clip, window) as kept:
         take = replace(whole, numbers=window, kept=kept)
         try:
-            timing = find_take_timing(take, first_light=first_light, watch=watch)
+            take, timing = _timed(take, first_light, watch)
         except NoStrobeError as fault:
             if too_short(clip.plan, window):
                 raise
@@ -138,17 +140,33 @@ def judged_take(
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip)
+            later = tuple(number for number in later if number > take.numbers[-1])
             lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
             notes = timing.notes
     return Check(
         clip=clip.name,
         path=path,
         frames=len(clip.numbers),
-        looked_at=len(window) + len(later),
+        looked_at=len(take.numbers) + len(later),
         seconds=time.monotonic() - began,
         judgements=tuple(one.spelled(caller.spell) for one in lines),
         notes=tuple(map(caller.spell, (*clip.warnings, *notes))),
     )
+
+
+def _timed(take: Take, first_light: str | None, watch: Watch) -> tuple[Take, Timing]:
+    """Return when a take's flashes fired, and the take with the frames that showed it: as many again, up to a bound,
+    where the first ones are too few, as beside frames that are missing. Raises NoStrobeError where neither show it."""
+    try:
+        return take, find_take_timing(take, first_light=first_light, watch=watch)
+    except NoStrobeError:
+        more = take.clip.numbers[: min(WIDER * len(take.numbers), MOST_FRAMES)]
+        if len(more) <= len(take.numbers):
+            raise
+        wider = replace(take, numbers=tuple(more))
+        with suppress(NoStrobeError):
+            return wider, find_take_timing(wider, first_light=first_light, watch=watch)
+        raise
 
 
 def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) -> tuple[Judgement, ...]:

@@ -22,10 +22,10 @@ from psvideo.sync.beside_breaks import doubted_places
 from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
 from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
-from psvideo.sync.restarted import found_apart, found_beside_dark, found_in_parts
+from psvideo.sync.restarted import found_apart, found_beside_dark, found_in_parts, found_within
 from psvideo.sync.rowfit.beat import Beat, train_until
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.moved_at_breaks import moved_at_breaks
+from psvideo.sync.rowfit.moved_at_breaks import between_lone_ends, moved_at_breaks
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import may_restart, odd_somewhere
 from psvideo.sync.rowfit.tracking.course import window_frames
@@ -76,7 +76,7 @@ def find_timing(
     parts = _parts(plan, rows, verdict)
     if parts:
         strobes = _named_strobes(plan, parts, first_light)
-        chapters = [_chapter(take.only(cut), one) for (cut, _), one in zip(parts, strobes, strict=True)]
+        chapters = [_chapter(take, cut, one) for (cut, _), one in zip(parts, strobes, strict=True)]
         return joined(chapters, take.dropped, take.outside([cut for cut, _ in parts]))
     _refuse_unless_believed(plan, rows, verdict, clip)
     return _timing(take, _strobe(plan, verdict.found, first_light))
@@ -114,6 +114,9 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
     apart = found_apart(plan, rows, moved_at_breaks(plan, whole)) if believed else []
     if len(apart) > 1:
         return apart
+    inner = between_lone_ends(whole) if believed else None
+    if inner:
+        return found_within(plan, rows, inner)
     parts = found_in_parts(plan, rows)
     if not parts:
         parts = found_beside_dark(plan, rows)
@@ -129,16 +132,18 @@ def _named_strobes(plan: Plan, parts: Sequence[tuple[slice, ClipFit]], first_lig
     return [FoundStrobe(found=found, order=order) for found, order in named]
 
 
-def _chapter(part: _Take, strobe: "FoundStrobe") -> Chapter:
+def _chapter(take: _Take, cut: slice, strobe: "FoundStrobe") -> Chapter:
+    part, breaks = take.only(cut), (cut.start > 0, cut.stop < len(take.numbers))
     return Chapter(
         first=int(part.numbers[0]),
         last=int(part.numbers[-1]),
         more=int(strobe.found.track.index[-1] - part.indices[-1]),
-        timing=_timing(part, strobe),
+        timing=_timing(part, strobe, breaks=breaks),
     )
 
 
-def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
+def _timing(take: _Take, strobe: "FoundStrobe", *, breaks: tuple[bool, bool] = (False, False)) -> Timing:
+    """Return the timing of a take, or of a part of one; ``breaks``: whether it begins and ends where the strobe did."""
     plan, found, beat = take.plan, strobe.found, strobe.found.fit.beat
     timing = timing_of_fit(
         plan,
@@ -151,7 +156,7 @@ def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
     black = black_frames(plan, found)
     spoilt = np.union1d(black, doubted_places(found, take.indices))
     seen = marked(plan, found, timing.flashes, spoilt)
-    unfired = unfired_of(plan, found, seen)
+    unfired = unfired_of(plan, found, seen, breaks=breaks)
     seen = incomplete(seen, unfired.beside)
     fired = incomplete(seen, unfired.never)
     notes = (

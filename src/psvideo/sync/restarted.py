@@ -50,6 +50,12 @@ def found_apart(plan: Plan, rows: Profiles, cuts: Sequence[int]) -> list[tuple[s
     return _found(plan, rows, [slice(a, b) for a, b in pairwise([0, *cuts, len(rows.value)])])
 
 
+def found_within(plan: Plan, rows: Profiles, frames: slice) -> list[tuple[slice, ClipFit]]:
+    """Return some consecutive frames of a clip and their fit, nothing where the strobe is not found in them."""
+    found = _judged_one(plan, rows, frames)
+    return [(frames, found)] if found else []
+
+
 def _found(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[tuple[slice, ClipFit]]:
     if len(cuts) < 2:
         return []

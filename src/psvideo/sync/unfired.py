@@ -65,12 +65,15 @@ class Unfired:
     beside: frozenset[int]
 
 
-def unfired_of(plan: Plan, found: ClipFit, flashes: Sequence[Flash]) -> Unfired:
+def unfired_of(
+    plan: Plan, found: ClipFit, flashes: Sequence[Flash], *, breaks: tuple[bool, bool] = (False, False)
+) -> Unfired:
     """Return which of a clip's flashes, in order, give no light where others go on. ``found`` is the fit under the
     lights' names.
 
     A flash of which too little was seen, as below 360 degrees most that fall between two exposures, is one where those
-    of its light before and after are, and may be one where one of them is.
+    of its light before and after are, and may be one where one of them is. ``breaks``: whether the strobe began at the
+    first frame, or stopped at the last, which flashes beyond all that were seen well may not have seen.
     """
     lit = [flash for flash in flashes if not flash.is_dark]
     if not lit:
@@ -85,6 +88,9 @@ def unfired_of(plan: Plan, found: ClipFit, flashes: Sequence[Flash]) -> Unfired:
             dead = [bool(off[k]) for k in around if k is not None]
             if any(dead):
                 (never if all(dead) else beside).add(lit[n].index)
+    seen = np.flatnonzero(told)
+    early, late = (lit[: seen[0]], lit[seen[-1] + 1 :]) if len(seen) else ([], [])
+    beside.update(flash.index for there, some in zip(breaks, (early, late), strict=True) if there for flash in some)
     return Unfired(never=frozenset(never), beside=frozenset(beside))
 
 

@@ -22,6 +22,8 @@ from psvideo.sync.rowfit.tracking.losses import frame_losses
 
 FEW = 3
 """More frames that are missing (or repeated) in one place can stand for nearly any move."""
+LONE = 2
+"""So few frames beyond such a place fit somewhere by chance."""
 LEAST, NEAR = 6, 36
 """Frames between two breaks that show where they are in time, and how many beside a break are asked."""
 MOST_BREAKS = 6
@@ -66,6 +68,21 @@ def moved_at_breaks(plan: Plan, found: ClipFit) -> list[int]:
         return []
     rows = replace(found.rows.one_window(), restless=None)
     return [int(fitted[one.before.stop - 1]) + 1 for one in breaks if _moved_there(plan, rows, found.fit.beat, one)]
+
+
+def between_lone_ends(found: ClipFit) -> slice | None:
+    """Return a clip's frames but for one or two lit ones at an end, with those in the dark beyond, that many missing
+    frames part from the others; None where there are none.
+
+    A strobe that stops within a frame leaves one that fits somewhere by chance.
+    """
+    index = found.track.index
+    fitted = np.flatnonzero(~found.track.repeated & ~found.unlit)
+    holes = np.flatnonzero(np.diff(index[fitted]) - np.diff(fitted) > FEW) + 1
+    early, late = holes[holes <= LONE], holes[holes >= len(fitted) - LONE]
+    first = int(fitted[early[-1]]) if len(early) else 0
+    end = int(fitted[late[0]]) if len(late) else len(index)
+    return slice(first, end) if end - first < len(index) else None
 
 
 def _breaks(stray: IntArray) -> Iterator[_Break]:
