@@ -82,6 +82,21 @@ def movie(clip: Path, path: Path) -> Path:
 
 WRONG_PLACE = {
     "no command": (["{clip}"], 2, "the command comes first. psvideo info {clip}"),
+    "another program's name of an option": (
+        ["normals", "{clip}", "--rig", "{clip}/rig.toml", "--preset", "nuke", "-o", "{tmp}/o"],
+        2,
+        "no option --preset; did you mean --for?",
+    ),
+    "one clip as two cameras": (
+        ["sync", "{clip}", "{clip}"],
+        2,
+        "{clip}: named twice; expected the clips of",
+    ),
+    "the clip for the results": (
+        ["normals", "{clip}", "--rig", "{clip}/rig.toml", "-o", "{clip}"],
+        2,
+        "holds a plan.toml, so it is nothing that this command wrote",
+    ),
     "a command misspelled": (["normal", "{clip}"], 2, "there is no command 'normal'; did you mean 'normals'?"),
     "no rig": (["normals", "{clip}", "-o", "{tmp}/o"], 2, "the file that says where the lights are"),
     "the folder above": (["sync", "{day}"], 1, "A clip lies in it: name {clip}."),

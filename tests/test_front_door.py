@@ -235,6 +235,17 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         lambda: NOT_TYPED.relight(GOOD[0], (0, 0, 1)),
         "`surface` is of type ndarray; expected a S",
     ),
+    "masked pictures": (
+        lambda: ps.solve_images(np.ma.masked_less(GOOD, 0.1), DIRECTIONS),
+        "masked arrays.*with `mask`",
+    ),
+    "a list of masked pictures": (
+        lambda: ps.solve_images([np.ma.masked_less(image, 0.1) for image in GOOD], DIRECTIONS),
+        "masked arrays.*with `mask`",
+    ),
+    "no direction": (lambda: ps.solve_images(GOOD, DIRECTIONS * [[1], [1], [0], [1]]), "number 2 is .0, 0, 0."),
+    "no light": (lambda: ps.solve_images(-np.asarray(GOOD), DIRECTIONS), "hold no light: the brightest.*black level"),
+    "light taken away": (lambda: ps.relight(SURFACE, (0, 0, 1), gloss=-1), "`gloss` is -1; expected a number of 0 or"),
     "a number of colour": (lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), colour=0.5), "`colour` is 0.5; expected .red"),
     "a colour's name": (
         lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), colour="red"),
@@ -290,6 +301,12 @@ def test_strengths_beside_a_rig_are_refused() -> None:
     rig = ps.Rig(lights=(ps.Light(name="a", direction=(0, 0, 1)),))
     with pytest.raises(UsageError, match="beside a Rig"):
         ps.solve_images(GOOD, rig, intensities=[1.0])
+
+
+def test_what_is_missing_in_a_picture_is_shown_as_zero_is() -> None:
+    depth = np.array([[1.0, np.nan], [2.0, np.inf]], np.float32)
+    expected = ps.picture_of("depth", np.array([[1.0, 0.0], [2.0, 0.0]], np.float32))
+    assert (ps.picture_of("depth", depth) == expected).all()
 
 
 @pytest.mark.parametrize("name", ["normals", "albedo", "valid", "residual", "error", "depth", "position", "beauty"])

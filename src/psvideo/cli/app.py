@@ -20,6 +20,8 @@ from psvideo.errors import PsvideoError, UsageError, nearest
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
+RESUMED = ("split", "normals")
+"""The commands that go on where they were stopped."""
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:
@@ -79,12 +81,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stoppable():
             return _run(arguments)
     except KeyboardInterrupt:  # the command line library catches it only inside a command
-        return _stopped()
+        return _stopped(_words(arguments))
+
+
+def _words(arguments: Sequence[str] | None) -> list[str]:
+    return words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
     set_as_commands_do()
-    words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
+    words = _words(arguments)
     with compiling_said(quiet="-q" in words or "--quiet" in words), starving_said():
         try:
             with libraries_aside(words):
@@ -107,13 +113,15 @@ def _ended(words: Sequence[str]) -> int:
         return fault.exit_status
     except SystemExit as end:
         if end.code == STOPPED:
-            return _stopped()
+            return _stopped(words)
         return end.code if isinstance(end.code, int) else 0
     return 0
 
 
-def _stopped() -> int:
-    print("psvideo: stopped. What was finished is kept; split and normals go on with --resume.", file=sys.stderr)
+def _stopped(words: Sequence[str]) -> int:
+    goes_on = command_called(words) in RESUMED
+    kept = " What was finished is kept; the same command with --resume goes on." if goes_on else ""
+    print(f"psvideo: stopped.{kept}", file=sys.stderr)
     return PsvideoError.exit_status
 
 

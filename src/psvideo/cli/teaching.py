@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 import typer
@@ -19,6 +19,8 @@ MISSING = {
     "out": "It names what to write; nothing that exists is replaced without --force.",
 }
 """What options that may not be left out are for."""
+OTHER_NAMES = {"--preset": "--for", "--output": "--out", "--lights": "--rig"}
+"""What other programs, and other commands here, call an option."""
 NUMBERS = (
     (r"Input should be a valid integer.*", "expected a whole number"),
     (r"Input should be a valid number.*", "expected a number"),
@@ -69,6 +71,15 @@ def _with_the_nearest(message: str) -> str:
     return f"{message.rstrip('.')}; {meant}" if meant.endswith("?") else message
 
 
+def _refuse_other_names(args: Sequence[str], known: Set[str]) -> None:
+    """Raise where an option is typed under a name that it has elsewhere; what follows ``--`` is no option."""
+    typed = args[: args.index("--")] if "--" in args else args
+    for name in (word.partition("=")[0] for word in typed):
+        meant = OTHER_NAMES.get(name)
+        if meant in known and name not in known:
+            raise typer.BadParameter(f"there is no option {name}; did you mean {meant}?")
+
+
 class Teaching(TyperCommand):
     """A command whose help ends with its examples."""
 
@@ -83,7 +94,8 @@ class Teaching(TyperCommand):
         return params
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the words typed; what a beginner leaves out is explained."""
+        """Parse the words typed; what a beginner leaves out, or calls by another name, is explained."""
+        _refuse_other_names(args, {name for param in self.params for name in param.opts})
         try:
             return list(super().parse_args(ctx, args))
         except typer.BadParameter as fault:

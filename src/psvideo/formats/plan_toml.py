@@ -246,7 +246,8 @@ def find_plan(path: Path, *, given: Path | None = None) -> Path:
         raise PsvideoError(f"{folder}: there is no plan.toml here, but one folder up. Name the clip: {folder.parent}")
     if not plan.is_file():
         raise PsvideoError(
-            f"{folder}: there is no plan.toml here. Put the plan that the strobe played beside the footage, "
+            f"{path}: there is no plan.toml {'here' if path.is_dir() else 'beside it'}. Put the plan that the strobe "
+            "played beside the footage, "
             "name it with `plan`, or write one with psvideo capture-plan. Photographs, one per light, need none: "
             "psvideo stills."
         )

@@ -155,11 +155,11 @@ def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, s
         raise AllDoneError(
             f"{path}: all done. The run ended well, with the same footage and settings, so nothing was written."
         )
-    refuse_existing(path, force=force)
+    footage = (path / PLAN_FILE).exists() and not mark.startswith("truth/")
+    refuse_existing(path, force=force or footage)
     if not path.exists():
         return
     empty = path.is_dir() and not any(path.iterdir())
-    footage = (path / PLAN_FILE).exists() and not mark.startswith("truth/")
     if not empty and (footage or not (path / mark).is_file()):
         found = "holds a plan.toml" if footage else f"holds no {mark}"
         raise UsageError(

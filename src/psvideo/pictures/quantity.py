@@ -57,7 +57,7 @@ def picture_of(quantity: str, image: NDArray[np.generic], *, exposure: float | N
         kind = type(image).__name__
         raise UsageError(f"`image` is of type {kind}, which holds no numbers; expected an array of {row.name}.")
     _check_shape(row, array)
-    values = array.astype(np.float32)
+    values = np.nan_to_num(array.astype(np.float32), nan=0.0, posinf=0.0, neginf=0.0)  # 0 is shown as missing
     if row.shown == "normals":
         return normal_colours(values)
     if row.shown == "light":

@@ -65,6 +65,8 @@ def relight(
     tint = three_numbers("colour", colour, "(red, green, blue) of the light, 1.0 each for white").astype(np.float32)
     for name, number in (("strength", strength), ("gloss", gloss), ("shininess", shininess)):
         check_kind(name, number, Real, "a number")
+        if not 0 <= number < np.inf:
+            raise UsageError(f"`{name}` is {number!r}; expected a number of 0 or more.")
     light = (towards / length).astype(np.float32)
     normals = surface.normals.astype(np.float32)
     facing = np.maximum(normals @ light, 0.0)[..., None]

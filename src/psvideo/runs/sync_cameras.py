@@ -47,7 +47,7 @@ def sync_cameras(
     Raises
     ------
     UsageError
-        Where ``out`` exists, or ``starts_s`` are not as many as ``clips``.
+        Where ``out`` exists, ``starts_s`` are not as many as ``clips``, or a clip is named twice and they are left out.
     PsvideoError
         Where cameras saw different strobes, share no flashes, or it is not certain which they share.
 
@@ -68,6 +68,8 @@ def sync_cameras(
         raise UsageError("`clips`: expected two or more, of cameras that saw one strobe.")
     if starts_s is not None and len(starts_s) != len(clips):
         raise UsageError(f"`starts_s`: found {len(starts_s)} for {len(clips)} clips; expected one for each.")
+    if starts_s is None:
+        _refuse_one_clip_twice([path_of("clips", clip) for clip in clips])
     takes = []
     for clip in clips:
         take = open_take(path_of("clips", clip))
@@ -82,6 +84,15 @@ def sync_cameras(
     if out is not None:
         write_text(out, format_clocks(clocks))
     return clocks
+
+
+def _refuse_one_clip_twice(paths: Sequence[Path]) -> None:
+    """Raise UsageError where a clip is named twice: it agrees with itself at every turn of the cycle."""
+    seen = set[Path]()
+    for path in paths:
+        if path.resolve() in seen:
+            raise UsageError(f"{path}: named twice; expected the clips of different cameras.")
+        seen.add(path.resolve())
 
 
 def _named_alike(paths: Sequence[Path], clocks: CameraClocks) -> Iterator[str]:

@@ -40,6 +40,12 @@ def checked_images(
 
 def _stacked(images: ArrayLike | Sequence[ArrayLike]) -> NDArray[np.generic]:
     """Return pictures as one array, the light first."""
+    masked = isinstance(images, np.ma.MaskedArray)
+    if masked or (isinstance(images, Sequence) and any(isinstance(image, np.ma.MaskedArray) for image in images)):
+        raise UsageError(
+            "`images` are masked arrays, and which light a pixel lacks cannot be said that way. Give plain arrays "
+            "(images.filled(0)); leave pixels out of all lights with `mask`, True where to solve."
+        )
     if isinstance(images, np.ndarray):
         return images
     if not isinstance(images, Sequence) or not images or isinstance(images, str):
@@ -121,6 +127,11 @@ def checked_lights(directions: ArrayLike, intensities: ArrayLike | None, stack: 
     if not len(vectors):
         raise UsageError("There are no images, and no lights. Expected three of each at least.")
     lengths = np.linalg.norm(vectors, axis=1)
+    if not lengths.all():
+        raise UsageError(
+            f"`lights` number {int(np.argmin(lengths))} is (0, 0, 0), which is no direction; expected the unit vector "
+            "from the surface to the light."
+        )
     worst = int(np.argmax(np.abs(lengths - 1)))
     if abs(lengths[worst] - 1) > UNIT_TOLERANCE:
         raise UsageError(
@@ -134,6 +145,16 @@ def checked_lights(directions: ArrayLike, intensities: ArrayLike | None, stack: 
             zip((vectors / lengths[:, None]).tolist(), strengths.tolist(), strict=True)
         )
     )
+
+
+def check_lit(stack: Images) -> None:
+    """Raise UsageError where no image holds any light."""
+    brightest = float(stack.max())
+    if brightest <= 0:
+        raise UsageError(
+            f"`images` hold no light: the brightest of their values is {brightest:g}. Expected linear light above 0; "
+            "was too much taken off as black level or ambient light?"
+        )
 
 
 def check_count(lights: int, stack: Images) -> None:

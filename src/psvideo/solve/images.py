@@ -12,7 +12,7 @@ from psvideo.model.choices import NEAR_ITERATIONS, Solver
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
-from psvideo.solve.given import check_count, checked_images, checked_lights, checked_mask, checked_saturation
+from psvideo.solve.given import check_count, check_lit, checked_images, checked_lights, checked_mask, checked_saturation
 from psvideo.solve.near_surface import near_surface_of, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
@@ -95,6 +95,7 @@ def solve_images(
     _refuse_behind(rig)
     where = None if mask is None else checked_mask(mask, (rows, cols))
     unit = checked_saturation(saturation, stack, where)
+    check_lit(stack)
     plates = [image / unit for image in stack]
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
 

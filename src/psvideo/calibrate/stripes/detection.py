@@ -104,9 +104,9 @@ def check_stripes(fit: StripeFit, reading: FoundStripes, rows: int) -> None:
 NO_STRIPES = (
     f"holds no stripes that go evenly over the whole width with at least {FEWEST_PERIODS:g} periods over the height. "
     "Either the LED did not blink, or its light was too weak beside other light; or the exposure was a whole number of "
-    "blinks; or the shutter is global; or drawn text and panels lie over the picture (use clean `columns`). Film a "
-    "white sheet that only the LED lights, with the shortest exposure, and choose the LED's rate so that 5 to 40 "
-    "stripes fit into the height."
+    "blinks; or the shutter is global; or the picture is turned, so that the stripes stand upright; or drawn text and "
+    "panels lie over the picture (use clean `columns`). Film a white sheet that only the LED lights, with the shortest "
+    "exposure, and choose the LED's rate so that 5 to 40 stripes fit into the height."
 )
 
 
