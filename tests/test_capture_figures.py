@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from psvideo.capture.drawing.timeline import timeline
 from psvideo.model.camera import Camera
 from psvideo.model.cost.shoot_figures import dark_row_move_px, frames_per_flash, mixed_share, row_shares, shoot_figures
 from psvideo.model.plan import Mode, Plan, PlannedFlash
@@ -68,9 +69,9 @@ def test_equation_15_is_the_mean_rate_of_two_durations(one_s: float, other_s: fl
 
 def test_equation_13_is_the_dark_row_s_move() -> None:
     plan = paper_plan(200e-6)
-    assert dark_row_move_px(plan, 200e-6) == pytest.approx(200e-6 * 60 * 1080)
+    assert dark_row_move_px(plan, 0) == pytest.approx(200e-6 * 60 * 1080)
     upwards = paper_plan(200e-6, readout=-1.0)
-    assert dark_row_move_px(upwards, 200e-6) == pytest.approx(-200e-6 * 60 * 1080)
+    assert dark_row_move_px(upwards, 0) == pytest.approx(-200e-6 * 60 * 1080)
 
 
 @pytest.mark.parametrize("readout", [1.0, 0.6, -0.8])
@@ -78,7 +79,7 @@ def test_the_dark_row_moves_as_far_as_the_darkest_row_of_consecutive_frames(read
     plan = paper_plan(0.4e-3, rows=2000, readout=readout)
     phase_s = 3e-3 if readout > 0 else 12e-3
     first, second = (_middle_of_gap(plan, frame, phase_s) for frame in (0, 1))
-    assert second - first == pytest.approx(dark_row_move_px(plan, 0.4e-3), abs=2)
+    assert second - first == pytest.approx(dark_row_move_px(plan, 0), abs=2)
 
 
 def _middle_of_gap(plan: Plan, frame: int, phase_s: float) -> float:
@@ -95,6 +96,55 @@ def _middle_of_gap(plan: Plan, frame: int, phase_s: float) -> float:
         for start_s, length_s in zip(train.start_s, train.duration_s, strict=True)
     )
     return float(np.argmin(light_s))
+
+
+@pytest.mark.parametrize(
+    ("readout", "shutter", "durations_s", "dark_every"),
+    [
+        (0.98, 1.0, (2e-3, 1e-3, 0.5e-3), None),
+        (0.98, 0.5, (3e-3, 3e-3), None),
+        (-0.7, 0.5, (2e-3, 1e-3, 0.5e-3), None),
+        (0.6, 0.2, (2e-3, 1e-3, 0.5e-3), None),
+        (0.98, 1.0, (2e-3, 1e-3, 0.5e-3), 1),
+        (0.98, 0.5, (2e-3, 1e-3, 0.5e-3), 1),
+        (-0.7, 0.2, (1e-3, 1e-3), 2),
+        (0.98, 0.5, (1e-3,), 1),
+    ],
+)
+def test_the_dark_row_moves_to_the_nearest_one_of_the_next_frame(
+    readout: float, shutter: float, durations_s: tuple[float, ...], dark_every: int | None
+) -> None:
+    """Held against the dark rows of the drawn timeline, at start phases all over a cycle."""
+    plan = paper_plan(*durations_s, shutter=shutter, readout=readout, margin_s=2e-6)
+    if dark_every:
+        plan = replace(plan, flashes=(*plan.flashes, PlannedFlash(lights={}, duration_s=1e-3)), dark_every=dark_every)
+    seen = _moves_seen(plan)
+    for slot in range(len(plan.flashes)):
+        move_px, least_px = dark_row_move_px(plan, slot), min(seen.get(slot, []), default=None, key=abs)
+        assert (move_px is None) == (least_px is None), (slot, move_px, least_px)
+        assert move_px == pytest.approx(least_px, abs=1e-6)
+
+
+def _moves_seen(plan: Plan) -> dict[int, list[float]]:
+    """Return how far dark rows lie from each other in consecutive frames, by the slot that follows the first one."""
+    camera, seen = plan.camera, dict[int, list[float]]()
+    slot_of = {light: slot for slot, flash in enumerate(plan.flashes) for light in flash.lit}
+    for phase_s in np.arange(0.0, plan.cycle_s, camera.frame_period_s / 11.3):
+        drawn = timeline(plan, phase_s=float(phase_s), frames=2)
+        frame, later = drawn.frames[-2:]
+        for row in frame.dark_rows:
+            opens_s = frame.index * camera.frame_period_s + camera.row_time_s * (
+                row - (0 if camera.row_time_s > 0 else camera.height_px)
+            )
+            following = next(flash for flash in drawn.flashes if flash.start_s > opens_s + camera.exposure_s)
+            seen.setdefault(slot_of[following.label], []).extend(other - row for other in later.dark_rows)
+    return seen
+
+
+def test_a_dark_row_that_no_two_frames_show_does_not_move() -> None:
+    """The next one lies a frame's height away, up and down."""
+    plan = paper_plan(8e-3, 8e-3, 8e-3, fps=120, readout=0.95)
+    assert [slot.dark_row_move_px for slot in shoot_figures(plan).slots] == [None] * 3
 
 
 @pytest.mark.parametrize("readout", [1.0, 0.9, 0.5, 0.0, -0.7])

@@ -34,6 +34,23 @@ def test_the_readme_s_command_writes_a_plan_and_says_what_decides_the_shoot(tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
 
 
+@pytest.mark.parametrize(
+    ("shutter", "flash", "words"),
+    [
+        ("360", "0.4ms", "put together from two frames"),
+        ("180", "0.4ms", "scaled up from what one frame saw"),
+        ("300", "0.6ms", "scaled up from what one frame saw"),
+        ("300", "0.8ms", "scaled up from what one or two frames saw"),
+        ("300", "key=0.8ms,left=0.4ms,right=0.4ms", "scaled up from what one or two frames saw"),
+    ],
+)
+def test_partial_rows_are_put_together_from_as_many_frames_as_saw_them(shutter: str, flash: str, words: str) -> None:
+    """At 240 fps the shutter is closed for 2.08 ms of a frame at 180 degrees, for 0.69 ms at 300."""
+    camera = ["--size", "1920x1080", "--fps", "240", "--readout", "4.1ms", "--shutter", shutter]
+    lines = run(*camera, "--lights", "key,left,right", "--flash", flash).stderr.splitlines()
+    assert next(line for line in lines if line.startswith("partial rows")).rstrip().endswith(words)
+
+
 def test_without_an_output_the_plan_goes_to_standard_output_alone() -> None:
     result = run(*README)
     assert parse_plan(result.stdout).lights == ("key", "left", "right")

@@ -316,6 +316,39 @@ def test_a_strobe_in_step_with_the_frames_is_warned_of_with_a_dark_time_that_is_
     assert "in-step" not in kinds(planned(**{**in_step, "shutter": 360.0, "dark": "12.5ms"}))
 
 
+def test_a_given_flash_that_breaks_a_wish_for_sharpness_or_light_is_warned_of() -> None:
+    blurred = planned(flash="0.8ms", max_blur=1, speed="4000")
+    assert "blurs 3.2 px at 4000 px/s, over the limit of 1 px" in text_of(blurred, "blur")
+    assert "at most 0.25 ms" in text_of(blurred, "blur")
+    assert "blur" not in kinds(planned(flash="0.25ms", max_blur=1, speed="4000"))
+    dim = planned(flash="0.8ms", max_stops=1)
+    assert "3.64 stops less: over the limit of 1. " in text_of(dim, "dim")
+    assert "Flash for 5 ms and more" in text_of(dim, "dim")
+    assert "dim" not in kinds(planned(flash="5ms", max_stops=1))
+    with pytest.raises(UsageError, match="`max_blur_px` needs `speed_px_s`"):
+        planned(flash="0.8ms", max_blur=1)
+
+
+def test_advice_on_a_dim_flash_breaks_no_wish() -> None:
+    assert "Flash for 5 ms and more" in text_of(planned(flash="0.1ms", max_stops=1), "dim")
+    assert "Flash for 0.1562 ms and more" in text_of(planned(flash="0.1ms", max_stops=9), "dim")
+    for limits in ({"max_pulse": "0.12ms"}, {"max_blur": 1, "speed": "9000"}, {"power": "1%"}):
+        text = text_of(planned(flash="0.1ms", **limits), "dim")
+        assert "stops less" in text
+        assert "Flash for" not in text
+    both = text_of(planned(flash="0.8ms", max_blur=1, speed="4000", max_stops=1), "dim")
+    assert "Flash for" not in both
+    assert "Allow more stops" in both
+
+
+def test_dark_slots_of_a_code_are_made_rarer_by_what_a_coded_plan_accepts() -> None:
+    coded = text_of(planned(fps="240", readout="4ms", flash="0.2ms", marker="coded"), "flicker")
+    assert "Dark slots come" in coded
+    assert "dark_every" not in coded
+    assert "`marker` dark" in coded
+    assert "larger `dark_every`" in text_of(planned(fps="240", readout="4ms", flash="0.2ms", dark_every=4), "flicker")
+
+
 def test_two_lights_are_warned_of_before_anything_is_filmed() -> None:
     assert "Normals need three lights" in text_of(planned(lights="key,left"), "lights")
     assert "lights" not in kinds(planned())

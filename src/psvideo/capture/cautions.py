@@ -9,6 +9,7 @@ from fractions import Fraction
 
 from psvideo.capture.caution import Caution, note, warning
 from psvideo.capture.cautions_on_lamps import (
+    about_blur,
     about_seizures,
     about_the_leds,
     about_the_light_of_a_flash,
@@ -35,16 +36,18 @@ def request_cautions(request: ShootRequest) -> tuple[Caution, ...]:
 
 def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None = None) -> tuple[Caution, ...]:
     """Return what is to be said about the plan itself, whoever wrote it."""
+    limits = limits or Limits()
     return (
         *about_the_lights(plan),
-        *about_the_light_of_a_flash(figures),
+        *about_the_light_of_a_flash(plan, figures, limits),
+        *about_blur(figures, limits),
         *_about_the_marker(plan),
-        *about_seizures(figures),
+        *about_seizures(plan, figures),
         *about_the_margin(plan, figures),
         *about_blind_time(plan, figures),
         *about_three_frames(plan, figures),
         *about_motion(figures),
-        *about_the_leds(figures, limits or Limits()),
+        *about_the_leds(figures, limits),
         *about_synced_rows(plan, figures),
     )
 

@@ -1,5 +1,6 @@
 """Cautions on lamps: how many and how bright they are, what they bear, and whom their flashes harm."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from psvideo.capture.caution import Caution, warning
@@ -11,6 +12,8 @@ from psvideo.model.units import show_seconds
 
 MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
+STOPS_ROUNDED = 1e-3
+"""A wish is kept within this: the duration that is advised has four figures."""
 
 
 def about_the_lights(plan: Plan) -> Iterator[Caution]:
@@ -24,21 +27,52 @@ def about_the_lights(plan: Plan) -> Iterator[Caution]:
         )
 
 
-def about_the_light_of_a_flash(figures: ShootFigures) -> Iterator[Caution]:
-    """Warn of flashes so short that they give little light."""
-    dim = [slot for slot in figures.slots if not slot.is_dark and (slot.stops or 0.0) > MOST_STOPS]
-    if dim:
-        worst = max(dim, key=lambda slot: slot.stops or 0.0)
-        enough_s = worst.duration_s * 2 ** ((worst.stops or 0.0) - MOST_STOPS)
-        yield warning(
-            "dim",
-            f"A flash of {show_seconds(worst.duration_s)} gives {worst.light_share:.2%} of the light of the same lamp "
-            f"left on, {worst.stops:.1f} stops less: noise will show in the normals unless the lamps are "
-            f"made for it. Flash for {show_seconds(enough_s)} and more, bring the lamps closer, or film slower.",
-        )
+def about_the_light_of_a_flash(plan: Plan, figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
+    """Warn of flashes that give less light than the user wishes, or so little that noise will show."""
+    worst = max(figures.slots, key=lambda slot: slot.stops or 0.0)
+    stops, wished = worst.stops or 0.0, limits.max_stops
+    most = MOST_STOPS if wished is None else min(MOST_STOPS, wished)
+    if stops <= most + STOPS_ROUNDED:
+        return
+    enough_s = worst.duration_s * 2 ** (stops - most)
+    is_wish = wished is not None and stops > wished + STOPS_ROUNDED
+    why = (
+        f"over the limit of {wished:g}"
+        if is_wish
+        else "noise will show in the normals unless the lamps are made for it"
+    )
+    advice = "or allow more stops" if is_wish else "bring the lamps closer, or film slower"
+    if enough_s <= min(plan.camera.exposure_s, _longest_s(limits)):
+        advice = f"flash for {show_seconds(enough_s)} and more, {advice}"
+    yield warning(
+        "dim",
+        f"A flash of {show_seconds(worst.duration_s)} gives {worst.light_share:.2%} of the light of the same lamp left "
+        f"on, {stops:.{2 if is_wish else 1}f} stops less: {why}. {advice.removeprefix('or ').capitalize()}.",
+    )
 
 
-def about_seizures(figures: ShootFigures) -> Iterator[Caution]:
+def about_blur(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
+    """Warn of flashes during which the subject moves farther than the user wishes."""
+    worst = max(figures.slots, key=lambda slot: 0.0 if slot.is_dark else slot.blur_px or 0.0)
+    if limits.max_blur_px is None or (worst.blur_px or 0.0) <= limits.max_blur_px * (1 + 1e-9):
+        return
+    yield warning(
+        "blur",
+        f"A flash of {show_seconds(worst.duration_s)} blurs {worst.blur_px:.3g} px at {limits.speed_px_s:g} px/s, over "
+        f"the limit of {limits.max_blur_px:g} px. Flash for at most {show_seconds(_longest_s(limits))}, or slow the "
+        "subject down.",
+    )
+
+
+def _longest_s(limits: Limits) -> float:
+    """Return how long a flash may be for sharpness and the LEDs' longest pulse."""
+    longest_s = math.inf if limits.max_pulse_s is None else limits.max_pulse_s
+    if limits.max_blur_px is None or not limits.speed_px_s:
+        return longest_s
+    return min(longest_s, limits.max_blur_px / limits.speed_px_s)
+
+
+def about_seizures(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
     """Warn of rates at which flashing light can harm photosensitive people."""
     low, high = SEIZURE_HZ
     care = "Warn everybody on the set, let no photosensitive person stay, and keep eyes off the lights."
@@ -61,12 +95,17 @@ def about_seizures(figures: ShootFigures) -> Iterator[Caution]:
             f"{figures.flash_rate_hz:.1f} times a second. {care}",
         )
     if low <= figures.dark_slot_rate_hz <= high:
+        rarer = (
+            "A larger `dark_every` makes them rarer, up to what a board holds; two a second are enough, and `marker` "
+            "long needs none."
+        )
+        if plan.dark_code:
+            rarer = "A code needs that many: where one camera films, `marker` dark makes do with two a second."
         yield warning(
             "flicker",
             f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, a flicker of the whole scene between "
             f"{low:g} and "
-            f"{high:g} Hz. {care} A larger `dark_every` makes them rarer, up to what a board "
-            "holds; two a second are enough, and `marker` long needs none.",
+            f"{high:g} Hz. {care} {rarer}",
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from psvideo.capture.caution import Caution
 from psvideo.capture.cautions import request_cautions, shoot_cautions
 from psvideo.capture.request import ShootRequest
-from psvideo.capture.wish import LONG_MARKER, longest_flash
+from psvideo.capture.wish import LONG_MARKER, longest_flash, refuse_blur_of_unknown_speed
 from psvideo.errors import UsageError
 from psvideo.model.cost.shoot_figures import ShootFigures, shoot_figures
 from psvideo.model.maximal_length import TAPS
@@ -39,6 +39,7 @@ def plan_shoot(request: ShootRequest) -> Shoot:
     """Plan the shoot. Raises UsageError that names the option where what is asked for cannot be."""
     chosen = None
     flash_s = request.flash_s
+    refuse_blur_of_unknown_speed(request.limits)
     if flash_s is None:
         bound = longest_flash(request)
         flash_s = dict.fromkeys(request.lights, bound.flash_s)

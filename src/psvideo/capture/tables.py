@@ -67,7 +67,7 @@ def _deciding_rows(plan: Plan, figures: ShootFigures) -> Iterator[tuple[str, str
         yield "dark slots", f"{figures.dark_slot_rate_hz:.2f} a second, in {rounds}"
     yield "dark time", show_seconds(plan.dark_s) + _margin(plan, figures)
     if plan.mode != "synced":
-        yield "partial rows", f"{figures.partial_row_share:.1%} of each plate, put together from two frames"
+        yield "partial rows", f"{figures.partial_row_share:.1%} of each plate, {_partial_rows(plan)}"
     if figures.missing_row_share:
         yield "missing rows", f"{figures.missing_row_share:.1%} of each plate, seen by no frame"
     if figures.motion_per_flash_px is not None:
@@ -75,6 +75,16 @@ def _deciding_rows(plan: Plan, figures: ShootFigures) -> Iterator[tuple[str, str
             "motion",
             f"{figures.motion_per_flash_px:.3g} px from flash to flash, {figures.motion_per_round_px:.3g} px a round",
         )
+
+
+def _partial_rows(plan: Plan) -> str:
+    """Say what rows are made of that no frame holds whole: a row is blind between two frames below 360 degrees."""
+    blind_s = plan.camera.frame_period_s - plan.camera.exposure_s
+    if blind_s < 1e-6 * plan.camera.frame_period_s:
+        return "put together from two frames"
+    if blind_s >= max(plan.flashes[slot].duration_s for slot in plan.lit_slots):
+        return "scaled up from what one frame saw"
+    return "scaled up from what one or two frames saw"
 
 
 def _margin(plan: Plan, figures: ShootFigures) -> str:

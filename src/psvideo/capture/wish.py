@@ -3,13 +3,15 @@
 import math
 from dataclasses import dataclass
 
-from psvideo.capture.request import ShootRequest
+from psvideo.capture.request import Limits, ShootRequest
 from psvideo.errors import UsageError
 from psvideo.model.plan import default_dark_s
 from psvideo.model.units import show_seconds
 
 LONG_MARKER = 1.5
 """The marker flash of ``marker="long"`` is this much longer than the others: plainly so, and still cheap."""
+
+NEEDS_SPEED = "`max_blur_px` needs `speed_px_s`, and the reverse: blur = speed x flash duration. Give both."
 
 OPEN = "the time in which all rows are open"
 
@@ -33,8 +35,9 @@ def longest_flash(request: ShootRequest) -> Bound:
     sharpness and LEDs leave too little light.
     """
     limits = request.limits
-    if (limits.max_blur_px is None) != (limits.speed_px_s is None):
-        raise UsageError("`max_blur_px` needs `speed_px_s`, and the reverse: blur = speed x flash duration. Give both.")
+    refuse_blur_of_unknown_speed(limits)
+    if limits.max_blur_px is None and limits.speed_px_s is not None:
+        raise UsageError(NEEDS_SPEED)
     unlimited = limits.max_blur_px is None and limits.max_duty is None and limits.max_pulse_s is None
     if unlimited and request.mode == "synced" and _open_s(request) > 0:
         return Bound(flash_s=_open_s(request) / (LONG_MARKER if request.marker == "long" else 1.0), why=OPEN)
@@ -47,6 +50,12 @@ def longest_flash(request: ShootRequest) -> Bound:
     flash_s = _rounded_down(tightest.flash_s / (LONG_MARKER if request.marker == "long" else 1.0))
     _refuse_too_dark(request, flash_s, tightest)
     return Bound(flash_s=flash_s, why=tightest.why)
+
+
+def refuse_blur_of_unknown_speed(limits: Limits) -> None:
+    """Raise UsageError where a largest blur is given, and not how fast the subject moves."""
+    if limits.max_blur_px is not None and limits.speed_px_s is None:
+        raise UsageError(NEEDS_SPEED)
 
 
 def _bounds(request: ShootRequest) -> list[Bound]:

@@ -6,6 +6,7 @@ for flashes of different length eq. 15; the dark row's move is eq. 13.
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -23,9 +24,9 @@ class SlotFigures:
     the same as a number of stops lost. ``partial_row_share`` and ``missing_row_share``: of the rows of its plate, mean
     over all start phases, those that no single frame holds whole, and those that no frame saw at all (below 360°).
     ``frames_min`` to ``frames_max`` frames see something of the flash, the larger number for ``most_frames_share`` of
-    the start phases; None where the readout is unknown. ``dark_row_move_px``: how many rows further down the dark row
-    before the next flash lies than the one before this flash did a frame (in half-rate mode two frames) earlier; None
-    where there is no dark row to follow.
+    the start phases; None where the readout is unknown. ``dark_row_move_px``: how many rows further down than the dark
+    row before this flash the nearest dark row of the next frame (in half-rate mode of the next but one) lies; None
+    where no dark row is seen in both.
     """
 
     slot: int
@@ -141,7 +142,7 @@ def _slot_figures(plan: Plan, slot: int, speed_px_s: float | None) -> SlotFigure
         frames_min=frames[0] if frames else None,
         frames_max=frames[1] if frames else None,
         most_frames_share=frames[2] if frames else None,
-        dark_row_move_px=dark_row_move_px(plan, flash.duration_s),
+        dark_row_move_px=dark_row_move_px(plan, slot),
         blur_px=None if speed_px_s is None else speed_px_s * flash.duration_s,
     )
 
@@ -189,13 +190,31 @@ def frames_per_flash(plan: Plan, duration_s: float) -> tuple[int, int, float] | 
     return fewest, fewest + 1, length - fewest
 
 
-def dark_row_move_px(plan: Plan, duration_s: float) -> float | None:
-    """Return by how many rows a flash of this length moves the dark row from frame to frame (eq. 13 at 360°).
+def dark_row_move_px(plan: Plan, slot: int) -> float | None:
+    """Return by how many rows the dark row before a flash of this slot seems to move until the next frame.
 
-    Negative is up. None without a rolling readout (global, unknown) and in synced mode.
+    Negative is up. With one flash a frame this is eq. 13; with more of them the dark row that is nearest in the next
+    frame belongs to a later flash. Beside a dark slot there is no dark row. None where no two frames show the row:
+    without a rolling readout (global, unknown), in synced mode, and where the nearest one lies a picture away.
     """
     camera = plan.camera
     if plan.mode == "synced" or not camera.readout_s:
         return None
-    frames = 2 if plan.mode == "half-rate" else 1
-    return (plan.dark_s + duration_s - frames * camera.frame_period_s) / camera.row_time_s
+    later_s = camera.frame_period_s * (2 if plan.mode == "half-rate" else 1)
+    slots = plan.cycle_slots
+    moves_s = [move for at, own in enumerate(slots) if own == slot for move in _dark_row_moves_s(plan, at, later_s)]
+    nearest_s = min(moves_s, key=abs, default=math.inf)
+    return nearest_s / camera.row_time_s if abs(nearest_s) < abs(camera.readout_s) else None
+
+
+def _dark_row_moves_s(plan: Plan, at: int, later_s: float) -> Iterator[float]:
+    """Yield how much later than the dark row before a flash of the cycle the following ones open, ``later_s`` on."""
+    lit = [not plan.flashes[slot].is_dark for slot in plan.cycle_slots]
+    if not (lit[at - 1] and lit[at]):
+        return
+    passed_s = 0.0
+    while passed_s < 2 * later_s:
+        if lit[at - 1] and lit[at]:
+            yield passed_s - later_s
+        passed_s += plan.flashes[plan.cycle_slots[at]].duration_s + plan.dark_s
+        at = (at + 1) % len(lit)
