@@ -9,7 +9,7 @@ from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
 from psvideo.live.chain import Chain, LiveFrame
-from psvideo.live.following.follow import Follower, State, caught_up
+from psvideo.live.following.follow import Follower, Hole, State, caught_up
 from psvideo.live.following.history import timing_of
 from psvideo.live.following.lock import check_followed, frames_to_lock, lock
 from psvideo.live.following.phase_filter import Measured, smoothed
@@ -134,6 +134,33 @@ def test_a_strobe_that_was_started_again_is_found_again(make_plan: PlanMaker) ->
     timing = timing_of(chain.followed, clip="clip")
     later = replace(timing, flashes=tuple(one for one in timing.flashes if one.start_s > 1.25))
     true_s = np.array([flash.start_s for flash in again.flashes]) + 90 * plan.camera.frame_period_s
+    assert len(later.flashes) > 20
+    assert np.abs(apart_rows(later, true_s, plan)).max() < LIVE_ROWS
+
+
+def test_frames_that_the_lock_or_the_follower_finds_missing_are_counted_and_keep_their_places_after_a_restart(
+    make_plan: PlanMaker,
+) -> None:
+    """One frame is missing in the frames of the first lock, one later, and then the strobe starts again."""
+    plan = make_plan(width_px=8, height_px=96)
+    period_s, missing = plan.camera.frame_period_s, (20, 65)
+    again = shoot(plan, frames=110, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))
+    shot = [*shoot(plan, frames=90).frames, *again.frames]
+    chain = Chain(plan=plan)
+    for index, image in enumerate(image for at, image in enumerate(shot) if at not in missing):
+        chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
+    assert len(chain.followed) == 2
+    assert chain.state == "locked"
+    assert [hole for one in chain.followed for hole in one.holes] == [
+        Hole(before=20, count=1),
+        Hole(before=64, count=1),
+    ]
+    assert chain.lost_frames == 2
+    assert chain.followed[-1].span is not None
+    assert chain.followed[-1].span[1] == len(shot) - 1
+    timing = timing_of(chain.followed, clip="clip")
+    later = replace(timing, flashes=tuple(one for one in timing.flashes if one.start_s > 1.3))
+    true_s = np.array([flash.start_s for flash in again.flashes]) + 90 * period_s
     assert len(later.flashes) > 20
     assert np.abs(apart_rows(later, true_s, plan)).max() < LIVE_ROWS
 

@@ -229,13 +229,14 @@ class Chain:
                 return
             self._idle.clear()
             index = np.array([one[0] for one in fresh], np.int64)
+            known = sum(follower.missing_before(fresh[0][0]) for follower in self.followed)
             values = np.stack([one[1] for one in fresh])
             doubts = _stacked([one[2] for one in fresh], values)
             first_light = self.first_light if index[0] == self._first else None  # it speaks of the first frames alone
 
         def run() -> None:
             try:
-                found: Lock | str = lock(self.plan, index, values, doubt=doubts, first_light=first_light)
+                found: Lock | str = lock(self.plan, index + known, values, doubt=doubts, first_light=first_light)
             except NoStrobeError as fault:
                 found = str(fault)
             except Exception as fault:  # handed to whoever waits for the run
@@ -255,15 +256,21 @@ class Chain:
             self.why = ""
             known = [one for one in self._pending if index[0] <= one[0] <= index[-1]]
             later = [one for one in self._pending if one[0] > index[-1]]
-            follower = caught_up(self.plan, found, [one[1] for one in known], [one[2] for one in known])
-            follower.extra += int(found.places[-1] - index[-1])
-            places = dict(zip(index.tolist(), found.places.tolist(), strict=True))
+            numbers = index.tolist()
+            follower = caught_up(
+                self.plan, found, [one[1] for one in known], [one[2] for one in known], numbers=numbers
+            )
             for number, mean, doubt in later:
-                places[number] = follower.add(number, mean, doubt)
+                follower.add(number, mean, doubt)
+            for before in self.followed:  # what it took for missing in the frames that were searched is known better
+                self.lost_frames -= before.missing_before(self._last or 0) - before.missing_before(numbers[0])
+                before.holes[:] = [hole for hole in before.holes if hole.before <= numbers[0]]
+            self.lost_frames += follower.missing_before(self._last or 0)
             self.follower = follower
             self.followed.append(follower)
             if self._ring is not None and len(self.followed) == 1:
-                self._ring.moved(places)
+                taken = [*numbers, *(one[0] for one in later)]
+                self._ring.moved({number: number + follower.missing_before(number) for number in taken})
             elif self._ring is not None:
                 self._ring.frames.clear()
 

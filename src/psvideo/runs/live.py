@@ -227,8 +227,10 @@ def _running(
 def _timing(chain: Chain, source: LiveSource) -> Timing:
     """Return the timing of all that was followed, frames named by their files' numbers."""
     missing = dict(chain.gaps)
+    came_before = {at + count: at for at, count in chain.gaps.items()}
     for follower in chain.followed:
         for hole in follower.holes:
-            missing[hole.before - 1] = missing.get(hole.before - 1, 0) + hole.count
+            after = came_before.get(hole.before - 1, hole.before - 1)
+            missing[after] = missing.get(after, 0) + hole.count
     dropped = [DroppedFrames(after=at + source.first_number, count=count) for at, count in sorted(missing.items())]
     return timing_of(chain.followed, clip=source.name, dropped=dropped)

@@ -90,6 +90,10 @@ class Follower:
         row_time_s = self.beat.row_time_s or self.window.period_s / self.plan.camera.height_px
         return self.phase.error_at_s(at_s) / row_time_s
 
+    def missing_before(self, number: int) -> int:
+        """Return how many frames were found missing before a numbered one."""
+        return sum(hole.count for hole in self.holes if hole.before <= number)
+
     def trimmed(self, at_s: float, ppm: float) -> None:
         """Foresee that the strobe, from a time on, comes later by this many ppm of the time that passes."""
         since_s = self.window.frames[0].index * self.window.period_s if self.window.frames else at_s
@@ -207,12 +211,27 @@ def following(plan: Plan, lock: Lock) -> Follower:
 
 
 def caught_up(
-    plan: Plan, lock: Lock, values: Sequence[FloatArray], doubts: Sequence[FloatArray | None] | None = None
+    plan: Plan,
+    lock: Lock,
+    values: Sequence[FloatArray],
+    doubts: Sequence[FloatArray | None] | None = None,
+    *,
+    numbers: Sequence[int] | None = None,
 ) -> Follower:
-    """Return what follows the strobe after the frames that the lock was found in, whose profiles these are."""
-    follower = following(plan, lock)
-    for place, value, doubt in zip(lock.places.tolist(), values, doubts or [None] * len(values), strict=True):
-        follower.add(place - follower.extra, value, doubt)
+    """Return what follows the strobe after the frames that the lock was found in, whose profiles these are.
+
+    ``numbers`` are the frames' own (left out: their places in time): where the lock has frames come later than these
+    say, and later than those before, frames are missing, as where the follower finds it.
+    """
+    follower, places = following(plan, lock), lock.places.tolist()
+    numbers = places if numbers is None else numbers
+    later = follower.extra = places[0] - numbers[0]
+    for number, place, value, doubt in zip(numbers, places, values, doubts or [None] * len(values), strict=True):
+        more, later = place - number - later, place - number
+        follower.extra += more
+        if more > 0:
+            follower.holes.append(Hole(before=number, count=more))
+        follower.add(number, value, doubt)
     return follower
 
 
