@@ -7,7 +7,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import NOTICED
 from psvideo.report.judgement import Judgement
-from psvideo.report.observe.astray import LEAST_SHOWN_PX
+from psvideo.report.observe.alignment.astray import LEAST_SHOWN_PX, Astray
 from psvideo.report.observe.observed import Observed
 
 FAST_PX, LOST_PX = 1.0, 4.0
@@ -18,6 +18,8 @@ OFTEN = 0.9
 """Motion is judged by what is reached in a tenth of the rounds."""
 LEAST_FOLLOWED = 0.5
 """In a smaller share of the rounds a speed says nothing of the take."""
+NOTABLE = 0.5
+"""A turn, a change of scale or a shift that makes this share of how far pictures lie apart is told."""
 
 
 def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False) -> Judgement:
@@ -67,24 +69,45 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
 def _places(observed: Observed) -> Judgement:
     """Judge whether photographs of a still scene are aligned, where that can be told."""
     found = observed.astray[0] if observed.astray else None
-    if found is None or (not found.shows and found.within_px > LEAST_SHOWN_PX):
+    if found is not None and found.shows:
+        return Judgement(
+            subject="motion",
+            grade="doubtful",
+            found=f"The camera or the subject moved between the pictures: {_apart(found)}, that of {found.light!r} "
+            f"{found.most_px:.1f} px off. Edges and fine detail of the normals suffer.",
+            advice="Take them again from a tripod without touching the camera, or align the pictures first.",
+        )
+    if found is None or found.within_px > LEAST_SHOWN_PX:
         return Judgement(
             subject="motion", grade="unknown", found="Motion is not known: no two whole plates of one light in turn."
         )
-    if not found.shows:
+    if not found.fits:
         return Judgement(
             subject="motion",
-            grade="good",
-            found=f"The pictures are aligned to within {max(found.within_px, 0.1):.1f} px.",
+            grade="unknown",
+            found="Whether the pictures are aligned is not known: their fine detail does not fit together, that of "
+            f"{found.light_that_fits_least!r} least. So it is where there is little but noise, where surfaces shine, "
+            "and where pictures lie far apart or under other lights than is said.",
         )
-    more = " or more" if found.typical_px > FAST_PX else ""
     return Judgement(
-        subject="motion",
-        grade="doubtful",
-        found=f"The camera or the subject moved between the pictures: they lie about {found.typical_px:.1f} px{more} "
-        f"apart, that of {found.light!r} {found.most_px:.1f} px off. Edges and fine detail of the normals suffer.",
-        advice="Take them again from a tripod without touching the camera, or align the pictures first.",
+        subject="motion", grade="good", found=f"The pictures are aligned to within {max(found.within_px, 0.1):.1f} px."
     )
+
+
+def _apart(found: Astray) -> str:
+    """Say by how much pictures lie apart, and what makes it where it is more than a shift."""
+    more = " or more" if found.at_least else ""
+    about = f"they lie about {found.typical_px:.1f} px{more} apart"
+    ways = [
+        (found.turned_px, f"turned by {found.turn_deg:.2f} degrees"),
+        (found.zoomed_px, f"{100 * found.zoom:.2f} % larger or smaller"),
+        (found.shift_px, f"shifted by {found.shift_px:.1f} px"),
+    ]
+    told = [words for size_px, words in ways if size_px > NOTABLE * found.typical_px]
+    if told == [ways[-1][1]] or not told:
+        return about
+    listed = f"{', '.join(told[:-1])} and {told[-1]}" if len(told) > 1 else told[0]
+    return f"{about}, {listed}"
 
 
 def _unfrozen(plan: Plan, timing: Timing, observed: Observed, speed_px_s: float) -> str:

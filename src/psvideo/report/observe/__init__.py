@@ -1,7 +1,7 @@
 """What is measured on plates and surfaces while a run goes on, for its report.
 
 ``observed`` gathers all of it, round by round; a round's own numbers are its ``facts``, and those of all rounds
-``kept_facts``. Each has a module: ``levels`` (exposure), ``motion``, ``astray`` (photographs that are not aligned),
-``focus``, ``shadow`` (what is left where no light reaches), ``steadiness``, ``worst`` (instants to look at), over
-``thinned`` pixels. Whether rig and curve are right is a room of its own, ``rig_and_curve``.
+``kept_facts``. Each has a module: ``levels`` (exposure), ``motion``, ``focus``, ``shadow``
+(what is left where no light reaches), ``steadiness``, ``worst`` (instants to look at), over ``thinned`` pixels. Whether
+rig and curve are right, and whether photographs are aligned, are rooms of their own: ``rig_and_curve``, ``alignment``.
 """

@@ -20,7 +20,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
-from psvideo.report.observe.astray import Astray, astray
+from psvideo.report.observe.alignment.astray import Astray, astray
 from psvideo.report.observe.facts import FAINT, Seen, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.kept_facts import KeptFacts

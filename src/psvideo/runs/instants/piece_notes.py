@@ -17,7 +17,7 @@ from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.surface import Reflectance, Subject
 from psvideo.model.timing import Timing
-from psvideo.report.observe.astray import Astray
+from psvideo.report.observe.alignment.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
