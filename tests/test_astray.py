@@ -19,7 +19,7 @@ from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.result import accuracy
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import Astray, astray
-from psvideo.report.observe.alignment.parts import Places, places_of_parts
+from psvideo.report.observe.alignment.part_places import PartPlaces, places_of_parts
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
@@ -198,7 +198,7 @@ def test_places_that_explain_nothing_are_no_motion(monkeypatch: pytest.MonkeyPat
     """Smooth shapes can feign places that all parts share, and what is left over grows where pictures go there."""
     images = shifted(pictures(8), np.random.default_rng(8).uniform(-1.5, 1.5, (8, 2)))
 
-    def contradicted(*arguments: Any, **options: Any) -> list[Places]:
+    def contradicted(*arguments: Any, **options: Any) -> list[PartPlaces]:
         return [replace(one, right=-one.right) for one in places_of_parts(*arguments, **options)]
 
     found = found_in(images)
@@ -217,13 +217,15 @@ def test_a_turn_shows_where_parts_are_too_unsure_for_a_shift_beside_it(monkeypat
     turns = rng.normal(size=8)
     turns *= 0.7 / np.hypot(*away.T).mean() / turns.std()
 
-    def said(*arguments: object, **options: object) -> list[Places]:
+    def said(*arguments: object, **options: object) -> list[PartPlaces]:
         found = [
             np.outer(turns, [-y, x]) + noise
             for (x, y), noise in zip(away, 0.7 * rng.normal(size=(16, 8, 2)), strict=True)
         ]
         return [
-            Places(middle=middle, found=one, square=np.eye(16), right=one.T.ravel(), left=32.0, agreement=np.ones(8))
+            PartPlaces(
+                middle=middle, found=one, square=np.eye(16), right=one.T.ravel(), left=32.0, agreement=np.ones(8)
+            )
             for middle, one in zip(away, found, strict=True)
         ]
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.rig_by_normals import facing_away, lights_crossed, normals_lean, surface_shines
 from psvideo.report.judge.rig_by_plates import (
+    lights_exchanged,
     lights_near,
     other_curve,
     rig_explains,
@@ -20,6 +21,10 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     is a guess; ``curve_doubt``: why pictures were likely coded by another curve, where that is known."""
     fit = observed.rig_fit
     firing = observed.firing_lights
+    swapped = None if fit is None else lights_exchanged(firing, fit)
+    if swapped:
+        yield swapped
+        return
     said = Judgement(subject="rig", grade="doubtful", found=_sentence(curve_doubt)) if curve_doubt else None
     curve = said or (None if fit is None else other_curve(fit))
     wrong = None if fit is None or curve else rig_misfits(firing, fit)
@@ -32,6 +37,14 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
         yield shining_surface(fit)
         return
     doubted = [one for one in (curve, wrong, crossed, away, near, None if near else leaning) if one]
+    if doubted and not said and any(one.shows for one in observed.astray):
+        yield Judgement(
+            subject="rig",
+            grade="unknown",
+            found="Whether rig and curve are right is not known: the pictures are not aligned, which looks the same. "
+            "See the line on motion.",
+        )
+        return
     yield from doubted
     if any(one.subject == "rig" for one in doubted):
         return

@@ -150,6 +150,8 @@ def _why_off(observed: Observed) -> tuple[str, str]:
     if any(one.shows for one in observed.astray):
         return "the pictures are not aligned", "See the line on motion"
     fit = observed.rig_fit
+    if fit is not None and fit.exchanged is not None:
+        return "two lights are exchanged", "See the line on the rig"
     if fit is not None and other_strengths(observed.firing_lights, fit):
         return "some lights are not as strong as the rig says", "See the line on the rig"
     if fit is not None and fit.excess > NOT_MATTE:

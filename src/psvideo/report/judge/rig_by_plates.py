@@ -69,6 +69,20 @@ def rig_misfits(lights: Sequence[str], fit: RigFit) -> Judgement | None:
     )
 
 
+def lights_exchanged(lights: Sequence[str], fit: RigFit) -> Judgement | None:
+    """Judge whether two of the lights are taken for each other; None where not."""
+    if fit.exchanged is None:
+        return None
+    one, other = (lights[light] for light in fit.exchanged)
+    return Judgement(
+        subject="rig",
+        grade="bad" if fit.excess > LOST_MISFIT else "doubtful",
+        found=f"{one!r} and {other!r} are exchanged: exchanged back, they explain most of the {100 * fit.misfit:.0f} % "
+        "of the light that cannot come from the rig's lights as they are named.",
+        advice="Exchange the two in the rig or the list of lights, or exchange their pictures.",
+    )
+
+
 def shining_surface(fit: RigFit) -> Judgement:
     """Say that it is the surface that is not matte, and not the rig that is wrong."""
     return Judgement(

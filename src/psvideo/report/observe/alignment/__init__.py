@@ -1,5 +1,6 @@
 """Whether photographs of one scene, each under a light of its own, lie one over the other.
 
-``astray`` begins: it asks ``parts`` of the picture, finely and then coarsely, by how much every picture lies off in
-them, and puts what they say together as a ``similarity`` for each picture: a shift, a turn and another scale.
+``astray`` begins: it asks parts of the picture, finely and then coarsely, where every picture lies in them
+(``part_places``), and puts what they say together as a ``similarity`` for each picture: a shift, a turn and another
+scale.
 """

@@ -1,7 +1,7 @@
 """By how far the camera, or the subject, moved between pictures of one scene that were taken under one light each.
 
-What the rig leaves unexplained says where each picture lies, and says so of parts of it (``parts``), whose words are
-put together (``similarity``). Two things more are asked before anybody is accused or acquitted. Pictures that moved
+What the rig leaves unexplained says where each picture lies, and says so of parts of it (``part_places``), whose words
+are put together (``similarity``). Two things more are asked before anybody is accused or acquitted. Pictures that moved
 are explained better where they are put back; and where detail lies one over the other, every picture's is foretold by
 the others. Of pictures that lie far apart neither fits, so that these are asked again in smaller ones.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.plates.light_plate import LightPlate
-from psvideo.report.observe.alignment.parts import Places, places_of_parts
+from psvideo.report.observe.alignment.part_places import PartPlaces, places_of_parts
 from psvideo.report.observe.alignment.similarity import Similarities, similarities
 from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
 
@@ -107,7 +107,7 @@ def astray(plates: Sequence[LightPlate], points: RigPoints, box: tuple[slice, sl
     return found
 
 
-def _said(fitted: Similarities, parts: Sequence[Places], lights: Sequence[str], reduced: int) -> Astray:
+def _said(fitted: Similarities, parts: Sequence[PartPlaces], lights: Sequence[str], reduced: int) -> Astray:
     """Return what similarities say, in pixels of the pictures as they were before they were made smaller."""
     middles = np.array([part.middle for part in parts])
     radius = float(np.sqrt(((middles - middles.mean(axis=0)) ** 2).sum(axis=1).mean()))

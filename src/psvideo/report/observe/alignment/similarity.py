@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.model.camera import FloatArray
-from psvideo.report.observe.alignment.parts import Places
+from psvideo.report.observe.alignment.part_places import PartPlaces
 
 PASSES, LEAST_WEIGHED = 30, 0.3
 """How often weights are found again, and the distance, in standard deviations, below which all count the same."""
@@ -42,7 +42,7 @@ class Similarities:
     explained: float
 
 
-def similarities(parts: Sequence[Places]) -> Similarities:
+def similarities(parts: Sequence[PartPlaces]) -> Similarities:
     """Return every picture's shift, turn and scale as parts say them."""
     middles = np.array([part.middle for part in parts])
     away = middles - middles.mean(axis=0)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.report.observe.rig_and_curve.exchanged import exchanged
 from psvideo.report.observe.rig_and_curve.lamp_strengths import LampStrengths, lamp_strengths, reaches
 from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
 from psvideo.report.observe.rig_and_curve.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
@@ -27,7 +28,8 @@ class RigFit:
     is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
     ``near`` is how near lamps stand that the rig takes for distant, ``curves`` what is left over under other transfer
     curves; both None where it says where they stand. ``lamps`` are strengths that shadows and highlights change little;
-    None where lights are too few for that."""
+    None where lights are too few for that. ``exchanged`` are two lights, by their place, that are taken for each
+    other."""
 
     misfit: float
     own_misfit: float
@@ -36,6 +38,7 @@ class RigFit:
     near: Nearness | None = None
     curves: OtherCurves | None = None
     lamps: LampStrengths | None = None
+    exchanged: tuple[int, int] | None = None
 
     @property
     def excess(self) -> float:
@@ -66,13 +69,15 @@ def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = 
     h = unit_free * h
     true = 1 / np.maximum(np.abs(h), 1e-3 * np.abs(h).max())
     strengths = tuple(float(value) for value in true / np.median(true))
-    near = curves = None
+    near = curves = pair = None
     if places is not None and len(vectors) == 1:
         near = nearness(unit, beyond[0], vectors[0], places[reached])
         curves = other_curves(light[reached], beyond[0])
+        pair = exchanged(moments, beyond[0])
     scaled = float(np.sqrt(max(share, 0)))
     return RigFit(
         misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves,
+        exchanged=pair,
         lamps=lamp_strengths(light[lit], vectors if len(vectors) == 1 else vectors[lit]),
     )  # fmt: skip
 

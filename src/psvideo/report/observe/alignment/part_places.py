@@ -35,7 +35,7 @@ SLACK = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Places:
+class PartPlaces:
     """Where pictures lie in one part of them, in pixels of the looked-at (reduced) pictures, columns and rows.
 
     ``middle`` (2,) is the part's; ``found`` (light, 2) are their places from the mean of all; ``square`` and ``right``
@@ -59,7 +59,7 @@ class Places:
 
 def places_of_parts(
     plates: Sequence[LightPlate], points: RigPoints, lights: Sequence[int], box: tuple[slice, slice], *, reduced: int
-) -> list[Places]:
+) -> list[PartPlaces]:
     """Return what parts of ``box`` (rows, columns) say of some ``lights``' plates, of pictures ``reduced`` times."""
     asked = [plates[light] for light in lights]
     found = (
@@ -91,7 +91,7 @@ def _vectors_at(points: RigPoints, part: tuple[slice, slice]) -> FloatArray:
 
 def _places(
     plates: Sequence[LightPlate], part: tuple[slice, slice], vectors: FloatArray, *, reduced: int
-) -> Places | None:
+) -> PartPlaces | None:
     """Return where each plate lies in a part of the picture; None where too little is lit by all lamps."""
     if min(side.stop - side.start for side in part) < reduced * CLEAR_PX:
         return None
@@ -111,7 +111,7 @@ def _places(
     found = np.linalg.solve(square + SLACK * np.trace(square) / len(square) * np.eye(len(square)), right)
     places = found.reshape(2, -1).T
     others = detail - left / np.maximum(1 - np.diag(explained), 1e-9)[:, None]
-    return Places(
+    return PartPlaces(
         middle=np.array([(side.start + side.stop) / 2 / reduced for side in part[::-1]]),
         found=np.asarray(places - places.mean(axis=0)),
         square=square,
