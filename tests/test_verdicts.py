@@ -472,6 +472,17 @@ def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_no
     assert [(line.grade, line.found) for line in said] == [("doubtful", "The files are tagged 'hlg'.")]
 
 
+@pytest.mark.parametrize(("noise_deg", "blamed"), [(3.9, "Move slower, raise"), (4.1, "Noise alone turns")])
+def test_where_noise_alone_spoils_normals_motion_is_not_blamed(noise_deg: float, blamed: str) -> None:
+    one = Footage().observed(0)
+    misfit = Misfit(share=0.01, error_deg=6.0, noise_deg=noise_deg / result.MEAN_OF_HELD)
+    one.facts = KeptFacts(
+        replace(facts, misfit=misfit, valid_share=0.16, measured_share=0.98, moving_share=0.14) for facts in one.facts
+    )
+    (lacking,) = result.validity(one)
+    assert blamed in lacking.advice
+
+
 def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s() -> None:
     one = Footage().observed(0)
     one.slopes[:] = [-0.2]

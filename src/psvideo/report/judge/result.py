@@ -103,6 +103,12 @@ def _trusting(observed: Observed) -> str:
     """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
     if off_deg(observed) is None and _steady(observed):
         return 'Use more lights; more light does not help. `aov=["error"]` says how far off each pixel may be.'
+    noise_deg = by_noise_deg(observed.facts)
+    if moves(observed.facts) and noise_deg > NOISY_DEG:
+        return (
+            f"Noise alone turns a typical normal by {noise_deg:.0f} degrees: give more light, or use more lights. What "
+            'moves must move slower besides, if it is lost then. `aov=["error"]` says how far off each pixel may be.'
+        )
     if moves(observed.facts):
         return (
             "Move slower, raise the frame rate or flash fewer lights, and give fine detail to follow: plates of what "
@@ -110,7 +116,7 @@ def _trusting(observed: Observed) -> str:
             'pictures. `aov=["error"]` says how far off each pixel may be.'
         )
     said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
-    if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:
+    if said and noise_deg < LITTLE_NOISE_DEG:
         return "More light does not help; the line on the typical error says what does."
     return "Give more light, or use more lights" + (
         "." if said else '; `aov=["error"]` says how far off each pixel may be.'
