@@ -170,7 +170,7 @@ def test_a_first_light_that_the_plan_does_not_have_is_refused_at_once(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["live", str(clip), "--first-light", "nobody", "--no-page"]) == 2
-    assert "no such light in the plan; its lights are" in capsys.readouterr().err
+    assert "no such flash in the plan; its flashes are" in capsys.readouterr().err
 
 
 def test_the_first_light_names_the_first_frames_flashes_and_not_those_after_a_pause(make_plan: PlanMaker) -> None:

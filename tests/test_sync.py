@@ -154,8 +154,41 @@ def test_without_a_marker_the_names_are_called_a_guess_until_they_are_given(make
     given = timing_of(plan, shot, first_light=next(iter(first.lights)))
     assert given.order == "given"
     assert names_right(given, shot)
-    with pytest.raises(UsageError, match="no such light in the plan"):
+    with pytest.raises(UsageError, match="no such flash in the plan; its flashes are"):
         timing_of(plan, shot, first_light="kee")
+
+
+@pytest.mark.parametrize(
+    ("dark", "first", "order"),
+    [(False, None, "key left right"), (False, "left", "left right key"), (True, "right", "right - key left")],
+)
+def test_a_synced_clip_begins_with_the_light_that_is_named(
+    dark: bool, first: str | None, order: str, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(mode="synced", readout=0.0, dark=dark)
+    names = list(plan.lights)
+    timing = find_timing(plan, np.arange(len(order.split())), np.zeros((4, 2)), first_light=first)
+    assert ["+".join(flash.lit) or "-" for flash in timing.flashes] == order.split(), names
+
+
+def test_lights_that_flash_together_are_named_together(make_plan: PlanMaker) -> None:
+    plan = make_plan(mode="synced", readout=0.0, dark=False)
+    pair = replace(plan.flashes[1], lights={"left": 1.0, "right": 0.5})
+    plan = replace(plan, flashes=(plan.flashes[0], pair, plan.flashes[2]))
+    timing = find_timing(plan, np.arange(3), np.zeros((3, 2)), first_light="right+left")
+    assert timing.flashes[0].lit == ("left", "right")
+    with pytest.raises(UsageError, match=r"its flashes are key, left\+right, right"):
+        find_timing(plan, np.arange(3), np.zeros((3, 2)), first_light="left")
+
+
+@pytest.mark.parametrize("phase_s", [0.0002, 0.002, 0.006])
+def test_below_360_degrees_the_first_light_is_the_first_complete_flashes(phase_s: float, make_plan: PlanMaker) -> None:
+    plan = make_plan(shutter=0.5, readout=0.4, dark=False)
+    shot = shoot(plan, phase_s=phase_s)
+    first = next(flash for flash in shot.flashes if flash.complete)
+    timing = timing_of(plan, shot, first_light="+".join(first.lit))
+    assert next(flash for flash in timing.flashes if flash.complete).lit == first.lit
+    assert names_right(timing, shot)
 
 
 def test_a_first_light_that_the_marker_contradicts_is_refused(make_plan: PlanMaker) -> None:

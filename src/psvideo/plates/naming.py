@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import Take
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import PsvideoError
+from psvideo.model.first_light import TOGETHER, check_first_light, first_lit, is_called
 from psvideo.model.marker import alike_turns
+from psvideo.model.plan import HasLights
 from psvideo.model.rig import Rig
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
@@ -34,26 +36,23 @@ def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
 
     Raises UsageError where the plan has no such light, and PsvideoError where the cycle's marker says otherwise.
     """
-    if first_light not in take.plan.lights:
-        raise UsageError(
-            f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(take.plan.lights)}."
-        )
+    check_first_light(take.plan, first_light)
     for turn in alike_turns(take.plan):
         named = named_by_turn(take.plan, timing, turn)
-        if first_light == _first_lights(named):
+        first = _first_complete(named)
+        if first is not None and is_called(first, first_light):
             return replace(named, order="given", order_note="")
+    seen = _first_complete(timing)
     raise PsvideoError(
-        f"`first_light` {first_light} does not fit the timing: its first complete flash is {_first_lights(timing)}'s, "
+        f"`first_light` {first_light} does not fit the timing: its first complete flash is "
+        f"{TOGETHER.join(seen.lit) if seen else 'none'}'s, "
         f"and no turn of the cycle by which flashes stay alike makes it {first_light}'s. "
         "Leave the option out, or leave `timing` out to find the flashes again."
     )
 
 
-def _first_lights(timing: Timing) -> str:
-    for flash in timing.flashes:
-        if flash.complete and flash.lit:
-            return "+".join(flash.lit)
-    return ""
+def _first_complete(timing: Timing) -> HasLights | None:
+    return first_lit(flash for flash in timing.flashes if flash.complete)
 
 
 def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:

@@ -28,6 +28,7 @@ from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveStatus, LiveSummary
 from psvideo.live.watching import Watching, told
 from psvideo.model.choices import Pace
+from psvideo.model.first_light import check_first_light
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing, timed_camera
@@ -40,7 +41,6 @@ from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.illumination import illumination
 from psvideo.strobe.link.ports import AUTO
 from psvideo.strobe.runlog import RunLog, format_log
-from psvideo.sync.find import check_first_light
 
 
 def live(

@@ -13,17 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.errors import NoStrobeError, PsvideoError, UsageError
+from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.plan import Plan
+from psvideo.model.first_light import TOGETHER, check_first_light, first_lit, is_called
+from psvideo.model.plan import HasLights, Plan
 from psvideo.model.timing import DroppedFrames, Order, Timing
 from psvideo.model.units import counted
 from psvideo.sync.beside_breaks import doubted_places
 from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
-from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
+from psvideo.sync.flashes_seen import flashes_of_fit, synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
 from psvideo.sync.restarted import found_apart, found_beside_dark, found_in_parts, found_within
-from psvideo.sync.rowfit.beat import Beat, train_until
+from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.moved_at_breaks import between_lone_ends, moved_at_breaks
 from psvideo.sync.rowfit.profiles import Profiles
@@ -63,7 +64,7 @@ def find_timing(
     """
     check_first_light(plan, first_light)
     if plan.mode == "synced":
-        return synced_timing(plan, indices, clip=clip, dropped=dropped)
+        return synced_timing(plan, indices, clip=clip, dropped=dropped, first_light=first_light)
     rows = _to_fit(plan, indices, profiles, doubt, clip=clip)
     verdict = believed_fit(plan, rows)
     take = _Take(
@@ -169,14 +170,6 @@ def _timing(take: _Take, strobe: "FoundStrobe", *, breaks: tuple[bool, bool] = (
     return replace(timing, flashes=fired, notes=notes)
 
 
-def check_first_light(plan: Plan, first_light: str | None) -> None:
-    """Raise UsageError where the light of the first flash is none of the plan's."""
-    if first_light is not None and first_light not in plan.lights:
-        raise UsageError(
-            f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
-        )
-
-
 @dataclass(frozen=True, kw_only=True)
 class FoundStrobe:
     """The fit of a clip whose beat names every flash, and how these names are known."""
@@ -265,29 +258,26 @@ def _order_of_lights(plan: Plan, found: ClipFit, first_light: str | None) -> tup
         return found.fit.beat, "given"
     candidates = turns(plan, found.rows, found.fit.beat)
     if first_light is not None:
-        return _given_order(plan, found.rows, candidates.beats, first_light), "given"
+        return _given_order(plan, found, candidates.beats, first_light), "given"
     return candidates.beats[0], "marker" if candidates.sure else "guess"
 
 
-def _given_order(plan: Plan, rows: Profiles, alike: Sequence[Beat], first_light: str) -> Beat:
+def _given_order(plan: Plan, found: ClipFit, alike: Sequence[Beat], first_light: str) -> Beat:
     for beat in alike:
-        if first_light == _first_complete_light(plan, rows, beat):
+        first = _first_complete(plan, found, beat)
+        if first is not None and is_called(first, first_light):
             return beat
-    seen = _first_complete_light(plan, rows, alike[0])
+    seen = _first_complete(plan, found, alike[0])
     raise PsvideoError(
         f"`first_light` {first_light} does not fit the footage: by the cycle's marker the clip's first complete flash "
-        f"is {seen}'s. Leave the option out, or check that plan.toml is the plan that the strobe played."
+        f"is {TOGETHER.join(seen.lit) if seen else 'none'}'s. Leave the option out, or check that plan.toml is the plan"
+        " that the strobe played."
     )
 
 
-def _first_complete_light(plan: Plan, rows: Profiles, beat: Beat) -> str:
-    """Return the light (or lights, joined by +) of the first lit flash that the clip holds from the first row on."""
-    train = train_until(plan, beat.clock, float(rows.frame_start_s[-1]))
-    first_s = float(rows.frame_start_s[0] + rows.place.max() * beat.row_time_s)
-    for slot, start_s in zip(train.slot, train.start_s, strict=True):
-        if start_s >= first_s and not plan.flashes[slot].is_dark:
-            return "+".join(plan.flashes[slot].lit)
-    return ""
+def _first_complete(plan: Plan, found: ClipFit, beat: Beat) -> HasLights | None:
+    """Return the first lit flash that the timing will call complete, if the beat's names are right."""
+    return first_lit(flash for flash in flashes_of_fit(plan, found, beat) if flash.complete)
 
 
 def _all_dropped(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.first_light import first_lit, is_called
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
@@ -37,10 +38,7 @@ def timing_of_fit(
     repeated: tuple[int, ...],
 ) -> Timing:
     """List every flash that the clip saw any of, and mark those that its start or end cuts; no notes yet."""
-    beat, index = found.fit.beat, found.rows.index
-    camera = fitted_camera(plan, found.fit)
-    span = int(index[0]), int(index[-1])
-    flashes = flashes_seen(plan, beat, camera, span, trusted=found.trusted, unsure=found.unsure, late=found.jitter.of)
+    beat, camera = found.fit.beat, fitted_camera(plan, found.fit)
     row_time_s = camera.row_time_s
     return Timing(
         clip=clip,
@@ -57,8 +55,16 @@ def timing_of_fit(
         repeated_frames=repeated,
         phase_error_s=found.fit.shift_error_s,
         row_time_error_s=found.fit.errors_s.get("row_time_s"),
-        flashes=flashes,
+        flashes=flashes_of_fit(plan, found, beat),
     )
+
+
+def flashes_of_fit(plan: Plan, found: ClipFit, beat: Beat) -> tuple[Flash, ...]:
+    """Return the flashes of which the clip saw any, under the names of a ``beat`` that differs from the fit's by these
+    alone."""
+    camera, index = fitted_camera(plan, found.fit), found.rows.index
+    span = int(index[0]), int(index[-1])
+    return flashes_seen(plan, beat, camera, span, trusted=found.trusted, unsure=found.unsure, late=found.jitter.of)
 
 
 def flashes_seen(
@@ -103,10 +109,22 @@ WITHIN = 1e-9
 frames, of which the clip may lack the second."""
 
 
-def synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped: Sequence[DroppedFrames]) -> Timing:
-    """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter."""
+def synced_timing(
+    plan: Plan,
+    indices: NDArray[np.int64],
+    *,
+    clip: str,
+    dropped: Sequence[DroppedFrames],
+    first_light: str | None = None,
+) -> Timing:
+    """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter.
+
+    Frame 0 holds the plan's first flash, or, where a ``first_light`` of the plan is named, the nearest after it from
+    which that one is the first to be lit.
+    """
     period_s, exposure_s = plan.camera.frame_period_s, plan.camera.exposure_s
-    train = plan.train(0, int(indices[-1]) + 1)
+    turn = 0 if first_light is None else _turn_to(plan, first_light)
+    train = plan.train(turn, int(indices[-1]) + 1)
     flashes = tuple(
         Flash(
             index=n,
@@ -129,3 +147,10 @@ def synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped:
         dropped_frames=tuple(dropped),
         flashes=flashes,
     )
+
+
+def _turn_to(plan: Plan, first_light: str) -> int:
+    """Return how many flashes of the cycle come before the one from which a light is the first to be lit."""
+    cycle = [plan.flashes[slot] for slot in plan.cycle_slots]
+    firsts = (first_lit([*cycle[turn:], *cycle]) for turn in range(len(cycle)))
+    return next(turn for turn, first in enumerate(firsts) if first is not None and is_called(first, first_light))
