@@ -31,8 +31,9 @@ IDLE_S = 0.1
 SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
 LEAVES_S = 5.0
-"""Whoever reads a source that is silent hears only with its next frame that the run is over, and is waited for
-this long."""
+"""Threads that are still at work when the run is over are waited for this long."""
+SILENT_LEAVES_S = 0.5
+"""Whoever reads a silent source hears only with its next frame that the run was ended, and is waited for this long."""
 Shows = Callable[[NewestRound], None]
 Meanwhile = Callable[[NewestRound, float], None]
 Said = Callable[[LiveStatus], None]
@@ -74,6 +75,7 @@ class Running:
     _preparing: bool = False
     _stop: threading.Event = field(default_factory=threading.Event)
     _came: threading.Event = field(default_factory=threading.Event)
+    _taking: threading.Lock = field(default_factory=threading.Lock)
     _fault: BaseException | None = None
 
     def __post_init__(self) -> None:
@@ -130,8 +132,10 @@ class Running:
         reading.start()
         threads = [reading, run_beside(partial(self._guarded, self._make), name="psvideo results")]
         asked = self._until_over(began_s)
-        for thread in threads:
-            thread.join(LEAVES_S)
+        if asked and self._taking.acquire(timeout=LEAVES_S):  # a frame that has come is recorded whole
+            self._taking.release()
+        for thread, wait_s in zip(threads, (SILENT_LEAVES_S if asked else LEAVES_S, LEAVES_S), strict=True):
+            thread.join(wait_s)
         if asked:  # whoever ends a run waits for no search
             return
         self.chain.wait(SEARCH_S)  # a short clip may end before the strobe is found in it
@@ -166,7 +170,10 @@ class Running:
 
     def _read(self) -> None:
         for frame in self.source.frames():
-            self._take(frame)
+            with self._taking:
+                if self._stop.is_set():
+                    break
+                self._take(frame)
             if self._stop.is_set() or self._over(frame.index):
                 break
 
