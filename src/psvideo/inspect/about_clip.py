@@ -17,6 +17,7 @@ from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findin
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.rows.clipping import SATURATED
 from psvideo.model.units import counted, listed
+from psvideo.report.judge.of_saturation import hidden_saturation, may_hide, numbers_to_look_at
 
 MANY = 3
 SATURATED_SHARE = 0.01
@@ -80,6 +81,10 @@ def _findings(clip: Clip) -> Iterator[Finding]:
     if rig.is_file():
         yield from rig_findings(rig, clip.plan)
     yield from _level_findings(clip)
+    if may_hide(clip):
+        some = read_frames(clip, numbers_to_look_at(clip, clip.numbers))
+        if saturation := hidden_saturation([frame.image for frame in some], clip):
+            yield warn(saturation.sentence)
 
 
 def _hole_findings(clip: Clip) -> Iterator[Finding]:

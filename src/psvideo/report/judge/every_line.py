@@ -24,16 +24,18 @@ def judgements(
     opened: bool = False,
     take_s: float | None = None,
     curve_doubt: str = "",
+    saturation: Judgement | None = None,
 ) -> tuple[Judgement, ...]:
     """Return one line per thing that decides whether a take can be used; ``take_s`` is how long a take lasts of which
-    only a part was looked at, ``curve_doubt`` what pictures say against the curve by which they were read."""
+    only a part was looked at, ``curve_doubt`` what pictures say against the curve by which they were read,
+    ``saturation`` that the sensor saturates where the plan does not say: nothing else is known of exposure then."""
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
     return (
         *on_time,
         *coverage(plan, timing, observed, take_s=take_s),
-        *exposure(observed, unused_stops=stops_unused(plan.camera.encoding)),
+        *([saturation] if saturation else exposure(observed, unused_stops=stops_unused(plan.camera.encoding))),
         *lamps(observed, timed=all(one.grade == "good" for one in on_time), missed=in_step(plan, timing)),
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),

@@ -25,6 +25,7 @@ from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
 from psvideo.report.run_report import LightFacts, RunReport, report_record
 from psvideo.runs.steps.lighting import Lighting
 from psvideo.runs.steps.output import Output
+from psvideo.runs.steps.saturation import saturation_of
 
 Pixels = NDArray[np.uint8]
 LIBRARIES = ("numpy", "opencv-contrib-python-headless", "numba", "OpenEXR")
@@ -85,7 +86,8 @@ def run_report(
         for name in clip.plan.lights
     )
     how = {} if solved is None else {"aligned": solved.aligned, "opened": solved.opened}
-    judged = judgements(clip.plan, timing, observed, curve_doubt=clip.curve_doubt, **how)
+    saturation = saturation_of(take)
+    judged = judgements(clip.plan, timing, observed, curve_doubt=clip.curve_doubt, saturation=saturation, **how)
     warned = (one for one in clip.warnings if one != clip.curve_doubt)  # which is judged
     warnings = (*warned, *(() if solved is None else solved.warnings))
     spell = output.caller.spell

@@ -1,0 +1,108 @@
+"""A sensor that saturates below the largest code of its curve: said, with the code to write into the plan."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lit_ball import LIT_BALL
+from numpy.typing import NDArray
+
+import psvideo as ps
+from psvideo.cli.app import main
+from psvideo.clip import read_frames
+from psvideo.report.judge.of_saturation import hidden_saturation
+from psvideo.runs.steps.saturation import saturation_of
+from psvideo.synth.shoot import shoot
+
+WHITE = 52_000
+"""The code at which the virtual sensor saturates, of 65,535."""
+SCENE = f"""
+schema = "psvideo-scene/1"
+name = "sphere"
+frames = 24
+seed = 3
+[camera]
+width_px = 96
+height_px = 72
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.01
+width_m = 1.6
+transfer = "slog3"
+bits = 16
+white_level = {WHITE}
+full_well_e = 20000.0
+read_e = 4.0
+[strobe]
+flash_s = 0.001
+{LIT_BALL}"""
+
+
+def filmed(folder: Path, *, intensity: float) -> Path:
+    """Film the ball; the plan does not say where the sensor saturates."""
+    (folder / "scene.toml").write_text(
+        SCENE.replace("[[light]]", f"[[light]]\nintensity = {intensity}"), encoding="utf-8"
+    )
+    shoot(folder / "scene.toml", folder / "clip")
+    plan = folder / "clip" / "plan.toml"
+    said = plan.read_text(encoding="utf-8")
+    assert f"white_level = {WHITE}" in said
+    plan.write_text(re.sub(r"white_level = .*\n", "", said), encoding="utf-8")
+    return folder / "clip"
+
+
+def test_a_sensor_that_saturates_where_the_plan_does_not_say_is_named_with_its_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip = filmed(tmp_path, intensity=1.6)
+    assert main(["check", str(clip)]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "usable as it is: clipping" in said
+    assert "% of the subject is clipped" not in said, "nothing is known of that"
+    code = int(re.search(r"Write white_level = (\d+)", said)[1])  # type: ignore[index]
+    assert WHITE - 700 < code <= WHITE  # within 0.15 stop, and not above
+    assert main(["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "out")]) == 0
+    assert f"white_level = {code}" in " ".join(capsys.readouterr().err.split())
+    assert main(["info", str(clip)]) == 0
+    assert f"white_level = {code}" in " ".join(capsys.readouterr().out.split())
+    plan = clip / "plan.toml"
+    plan.write_text(plan.read_text(encoding="utf-8").replace("[camera]", f"[camera]\nwhite_level = {code}", 1))
+    main(["check", str(clip)])
+    assert "Every light clips" in capsys.readouterr().out
+
+
+def test_light_that_is_not_clipped_ends_at_no_level(tmp_path: Path) -> None:
+    clip = filmed(tmp_path, intensity=0.9)
+    assert saturation_of(ps.open_take(clip)) is None
+
+
+Lit = NDArray[np.float32]
+
+
+def wall(strengths: tuple[float, ...], noise: float, cut: float) -> list[Lit]:
+    """Frames of a flat grey wall that fills the picture, one light each, and a dark one."""
+    rng = np.random.default_rng(5)
+    levels = 0.1 * np.array([*strengths, 0.0] * 4)[:, None, None]
+    seen = np.minimum(levels, cut) * (1 + noise * rng.standard_normal((levels.size, 60, 80)))
+    return [np.asarray(one, np.float32) for one in seen]
+
+
+def test_a_flat_wall_under_lights_of_its_own_strengths_is_not_clipped(tmp_path: Path) -> None:
+    clip = ps.open_take(filmed(tmp_path, intensity=0.5)).clip
+    assert hidden_saturation(wall((1.0, 0.9, 0.8), 0.01, 1.0), clip) is None
+    assert hidden_saturation(wall((1.0, 0.95, 0.5), 0.01, 1.0), clip) is None
+    clipped = hidden_saturation(wall((1.0, 0.9, 0.8), 0.005, 0.075), clip)
+    assert clipped is not None
+    assert clipped.grade == "bad"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [('"slog3"', '"srgb"'), ("[camera]", f"[camera]\nwhite_level = {WHITE}")], ids=["srgb", "named"]
+)
+def test_nothing_is_looked_for_where_the_plan_or_the_curve_says_it(tmp_path: Path, old: str, new: str) -> None:
+    clip = filmed(tmp_path, intensity=1.6)
+    assert len(list(read_frames(ps.open_take(clip).clip, (1,)))) == 1
+    plan = clip / "plan.toml"
+    plan.write_text(plan.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    assert saturation_of(ps.open_take(clip)) is None
