@@ -17,7 +17,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve
@@ -147,7 +147,9 @@ def shoot(stage: Stage, names: tuple[str, ...], *, rounds: int = ROUNDS, noise: 
             image = stage.plate(flash, still or stage.view(time_s))
             noisy = np.asarray(image + rng.normal(0, noise, image.shape), np.float32)
             seen = np.ones(len(image), np.bool_)
-            plates.append(LightPlate(light=name, number=1001 + index, time_s=time_s, picture=made(noisy), seen=seen))
+            plates.append(
+                LightPlate(light=name, number=1001 + index, time_s=time_s, picture=mixture_of(noisy), seen=seen)
+            )
         gathered.append(Round(number=1001 + index, plates=tuple(plates)))
     return tuple(gathered)
 

@@ -13,7 +13,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera_clocks import CameraClock
 from psvideo.model.plan import Plan
 from psvideo.model.rows.row_profiles import collect
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 from psvideo.synth import Noise, TrueClock, expose
 
@@ -83,7 +83,7 @@ def _seen(camera: _Camera, begins_s: float, seed: int) -> CameraTake:
     )
     pairs = [HeldFrame(index=n, image=image) for n, image in zip(shot.indices, shot.frames, strict=True)]
     indices, profiles = collect(iter(pairs))
-    return CameraTake(plan=plan, timing=find_timing(plan, indices, profiles, clip=camera.name))
+    return CameraTake(plan=plan, timing=timing_from_rows(plan, indices, profiles, clip=camera.name))
 
 
 def rows() -> Iterator[Line]:

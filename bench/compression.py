@@ -21,7 +21,7 @@ from bench.timing_scenes import plan_of
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.rows.row_profiles import collect_with_doubt
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Noise, TrueClock, expose
 
 TRIALS = 240
@@ -98,7 +98,7 @@ def tried(trial: Trial) -> Outcome:
         write_h264(path, plan, shot.frames, crf=trial.crf, preset=trial.preset)
         index, profiles, doubt = collect_with_doubt(read_back(path, plan))
     try:
-        timing = find_timing(plan, index, profiles, doubt=doubt)
+        timing = timing_from_rows(plan, index, profiles, doubt=doubt)
     except PsvideoError:
         return Outcome(trial=trial, made_rows=np.inf, claimed_rows=0.0, refused=True)
     off_s = [

@@ -12,7 +12,7 @@ import numpy as np
 import OpenEXR
 
 from bench.observing import noisy_surface
-from psvideo.export.sequences.planes import Made, planes_of
+from psvideo.export.sequences.planes import InstantPictures, planes_of
 from psvideo.export.space import Space
 from psvideo.formats.exr_files import write_exr
 from psvideo.model.choices import Compression
@@ -34,7 +34,7 @@ class Encoded(NamedTuple):
 
 def rows() -> Iterator[Encoded]:
     """Write the normals of one surface with every compression, as half floats and as floats."""
-    made = Made(surface=noisy_surface(0), space=Space())
+    made = InstantPictures(surface=noisy_surface(0), space=Space())
     planes = {name: np.ascontiguousarray(plane) for name, plane in planes_of("normals", made).items()}
     with tempfile.TemporaryDirectory(prefix="psvideo-bench-") as folder:
         path = Path(folder) / "normals.exr"

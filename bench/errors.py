@@ -12,7 +12,7 @@ from bench.timing_cases import Case
 from bench.timing_scenes import banded, plan_of, rolling_stripes, tumbling, void
 from psvideo.errors import PsvideoError
 from psvideo.model.rows.row_profiles import collect_with_doubt
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import TrueClock
 
 SEEDS = 100
@@ -81,7 +81,7 @@ def _errors_s(case: Case, seed: int) -> tuple[float, float]:
     """Return the RMS error over a clip's flashes, and the standard error that was claimed, in seconds."""
     filmed = case.film(seed)
     index, profiles, doubt = collect_with_doubt(filmed.frames)
-    timing = find_timing(case.claimed or case.plan, index, profiles, doubt=doubt)
+    timing = timing_from_rows(case.claimed or case.plan, index, profiles, doubt=doubt)
     off_s, _ = against_truth(timing, filmed, scale=1.0)
     return float(np.sqrt(np.mean(off_s**2))), timing.phase_error_s or 0.0
 

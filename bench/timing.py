@@ -15,7 +15,7 @@ from bench.timing_plates import HeldFrame, PlateErrors, plate_errors
 from psvideo.errors import PsvideoError
 from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import Timing, places_in_time
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 
 MOST_OVER_ORACLE = 1.05
 
@@ -132,7 +132,7 @@ def outcome(case: Case, seed: int) -> Outcome:
     filmed = case.film(seed)
     index, profiles, doubt = collect_with_doubt(filmed.frames)
     began = time.process_time()
-    timing = find_timing(case.claimed or case.plan, index, profiles, doubt=doubt)
+    timing = timing_from_rows(case.claimed or case.plan, index, profiles, doubt=doubt)
     cpu_s = time.process_time() - began
     error_s, right = against_truth(timing, filmed, _scale(case))
     camera = case.plan.camera

@@ -17,7 +17,7 @@ from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure
@@ -150,7 +150,7 @@ def judged(case: Case, claimed: np.ndarray) -> Judged:
     observed = Observed(lights=names, points=points)
     seen = np.ones(rows, np.bool_)
     plates = tuple(
-        LightPlate(light=name, number=1001, time_s=0.0, picture=made(plate), seen=seen)
+        LightPlate(light=name, number=1001, time_s=0.0, picture=mixture_of(plate), seen=seen)
         for name, plate in zip(names, case.plates, strict=True)
     )
     observed.add(Round(number=1001, plates=plates), surface)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
-from psvideo.plates.align import between, held
+from psvideo.plates.align import between, light_history
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.unsure import UNKNOWN
-from psvideo.plates.align.opened import with_open_shutter
+from psvideo.plates.align.open_shutter import with_open_shutter
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity import all_lights, flow
@@ -24,7 +24,7 @@ from psvideo.plates.align.velocity.moving_kernel import AT_REST, BOTH
 from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import Mixture, made
+from psvideo.plates.mixing.mixture import Mixture, mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve
@@ -104,7 +104,7 @@ def filmed(lights: int, motion: str, noise: float = 0.0) -> Filmed:
 
     def noisy(plate: LightPlate) -> LightPlate:
         return replace(
-            plate, picture=made(np.asarray(plate.image + rng.normal(0, noise, plate.image.shape), np.float32))
+            plate, picture=mixture_of(np.asarray(plate.image + rng.normal(0, noise, plate.image.shape), np.float32))
         )
 
     return replace(clip, rounds=tuple(replace(one, plates=tuple(map(noisy, one.plates))) for one in clip.rounds))
@@ -153,7 +153,7 @@ def noiseless(lights: int, motion: str, wider: float = 1.0) -> Filmed:
                     light=f"l{n}",
                     number=1001 + index,
                     time_s=time_s,
-                    picture=made(image),
+                    picture=mixture_of(image),
                     seen=np.ones(len(image), np.bool_),
                 )
             )
@@ -284,7 +284,7 @@ def test_no_more_plates_are_held_than_instants_need(
         nonlocal most, most_later
         for one in clip.rounds:
             for plate in one.plates:
-                own = replace(plate, picture=made(plate.image.copy()))
+                own = replace(plate, picture=mixture_of(plate.image.copy()))
                 count(own.image)
                 most = max(most, sum(sizes.values()))
                 most_later = max(most_later, sum(sizes.values()) if instants else 0.0)
@@ -296,7 +296,7 @@ def test_no_more_plates_are_held_than_instants_need(
         count(np.asarray(small.frames[0].codes))
         return small
 
-    monkeypatch.setattr(held, "packed", watched)
+    monkeypatch.setattr(light_history, "packed", watched)
     monkeypatch.setattr(between, "packed", watched)
     for shown in aligned(plates(), clip.lights, how, first=1001):
         instants += 1
@@ -339,7 +339,12 @@ def test_a_packed_plate_is_good_to_its_16_bits_and_what_is_clipped_stays_so() ->
     for saturation in (1.0, 1.37, 3.0):
         clipped = np.minimum(image, saturation).astype(np.float32)
         plate = LightPlate(
-            light="a", number=1, time_s=0.0, picture=made(clipped), seen=np.ones(60, np.bool_), saturation=saturation
+            light="a",
+            number=1,
+            time_s=0.0,
+            picture=mixture_of(clipped),
+            seen=np.ones(60, np.bool_),
+            saturation=saturation,
         )
         small = packed(plate.picture, saturation)
         assert np.asarray(small.frames[0].codes).nbytes == image.nbytes / 2
@@ -416,10 +421,10 @@ def test_what_no_motion_explains_is_solved_but_not_trusted() -> None:
     clip = filmed(3, "4 px", 0.002)
 
     def turned(plate: LightPlate) -> LightPlate:
-        return replace(plate, picture=made(np.ascontiguousarray(np.rot90(plate.image[:, 30:-30], 2).copy())))
+        return replace(plate, picture=mixture_of(np.ascontiguousarray(np.rot90(plate.image[:, 30:-30], 2).copy())))
 
     def cut(plate: LightPlate) -> LightPlate:
-        return replace(plate, picture=made(np.ascontiguousarray(plate.image[:, 30:-30])))
+        return replace(plate, picture=mixture_of(np.ascontiguousarray(plate.image[:, 30:-30])))
 
     shares = []
     for change in (cut, turned):
@@ -441,7 +446,7 @@ def at_once(clip: Filmed, time_s: float) -> Round:
     plates = []
     for n, plate in enumerate(clip.rounds[1].plates):
         flash = TrueFlash(index=0, slot=n, lights={plate.light: 1.0}, start_s=time_s, duration_s=1e-9, complete=True)
-        plates.append(replace(plate, picture=made(clip.stage.plate(flash, view)), time_s=time_s))
+        plates.append(replace(plate, picture=mixture_of(clip.stage.plate(flash, view)), time_s=time_s))
     return Round(number=1, plates=tuple(plates))
 
 
@@ -470,7 +475,7 @@ def test_rows_that_no_frame_saw_stay_unseen_and_do_not_look_like_motion() -> Non
     seen = (rows < 70) | (rows >= 110)
 
     def cut(plate: LightPlate) -> LightPlate:
-        return replace(plate, seen=seen, picture=made(plate.image * seen[:, None].astype(np.float32)))
+        return replace(plate, seen=seen, picture=mixture_of(plate.image * seen[:, None].astype(np.float32)))
 
     rounds = changed(clip, cut)
     for shown, given in zip(brought(clip, rounds=rounds)[1].plates, rounds[1].plates, strict=True):
@@ -490,7 +495,9 @@ def test_where_light_moves_as_much_is_clipped_as_clips_and_at_the_same_places(
     clip = filmed(3, motion)
 
     def brighter(one: Round) -> Round:
-        bright = tuple(replace(p, picture=made(np.minimum(gain * p.image, 1).astype(np.float32))) for p in one.plates)
+        bright = tuple(
+            replace(p, picture=mixture_of(np.minimum(gain * p.image, 1).astype(np.float32))) for p in one.plates
+        )
         return replace(one, plates=bright)
 
     shown = brought(clip, rounds=tuple(map(brighter, clip.rounds)))[1]
@@ -508,7 +515,7 @@ def test_nothing_is_clipped_by_being_moved() -> None:
     clip = filmed(3, "4 px")
 
     def brighter(one: Round) -> Round:
-        return replace(one, plates=tuple(replace(p, picture=made(_two_tones(p.image))) for p in one.plates))
+        return replace(one, plates=tuple(replace(p, picture=mixture_of(_two_tones(p.image))) for p in one.plates))
 
     for plate in brought(clip, rounds=tuple(map(brighter, clip.rounds)))[1].plates:
         assert 0.97 < plate.image.max() < 1.0
@@ -528,7 +535,7 @@ def test_noise_that_blocks_share_as_compression_makes_it_is_no_motion(motion: st
         root = np.sqrt(np.maximum(plate.image, 0)) + 0.02
         steps = np.kron(rng.normal(0, 0.6 / 255, (ROWS // 8 + 1, COLS // 8 + 1)), np.ones((8, 8)))[:ROWS, :COLS]
         shown = root + (steps + rng.normal(0, 0.05 / 255, steps.shape)).reshape(*steps.shape, *[1] * (root.ndim - 2))
-        return replace(plate, picture=made(np.square(np.maximum(shown - 0.02, 0)).astype(np.float32)))
+        return replace(plate, picture=mixture_of(np.square(np.maximum(shown - 0.02, 0)).astype(np.float32)))
 
     white = flow.white_of(before)
     sketches = [flow.sketch_of(compressed(plate), white=white) for plate in (before, after)]
@@ -546,7 +553,7 @@ def test_a_round_that_lacks_a_light_is_not_shown_but_helps_its_neighbours() -> N
 
 def brightened(one: Round, gain: float) -> Round:
     """The round as another exposure shows it."""
-    plates = (replace(plate, picture=made(plate.image * np.float32(gain))) for plate in one.plates)
+    plates = (replace(plate, picture=mixture_of(plate.image * np.float32(gain))) for plate in one.plates)
     return replace(one, plates=tuple(plates))
 
 
@@ -555,7 +562,8 @@ def test_an_exposure_that_changes_from_round_to_round_is_no_motion(gain: float) 
     clip = filmed(3, "at rest", 0.004)
     breathing = tuple(
         replace(
-            one, plates=tuple(replace(plate, picture=made(plate.image * np.float32(gain**n))) for plate in one.plates)
+            one,
+            plates=tuple(replace(plate, picture=mixture_of(plate.image * np.float32(gain**n))) for plate in one.plates),
         )
         for n, one in enumerate(clip.rounds)
     )
@@ -568,7 +576,8 @@ def test_what_moves_while_the_exposure_changes_is_still_followed(gain: float) ->
     clip = filmed(3, "4 px", 0.004)
     breathing = tuple(
         replace(
-            one, plates=tuple(replace(plate, picture=made(plate.image * np.float32(gain**n))) for plate in one.plates)
+            one,
+            plates=tuple(replace(plate, picture=mixture_of(plate.image * np.float32(gain**n))) for plate in one.plates),
         )
         for n, one in enumerate(clip.rounds)
     )
@@ -620,7 +629,7 @@ def test_what_changes_as_no_motion_explains_is_blended_by_time_while_a_shutter_i
         image[snow] = rng.choice([0.1, 0.7], (40, 60))
         at_s = PITCH_S * (3 * number + light)
         seen = np.ones(len(image), np.bool_)
-        plates.append(LightPlate(light=f"l{light}", number=number, time_s=at_s, picture=made(image), seen=seen))
+        plates.append(LightPlate(light=f"l{light}", number=number, time_s=at_s, picture=mixture_of(image), seen=seen))
     times_s = 3.5 * PITCH_S + PITCH_S / 3 * (np.arange(15) - 7) / 15
     due = Schedule(by_round={1: tuple((1001, float(time_s)) for time_s in times_s)}, left_out=(0, 0, 0))
     how = Aligning(rate=Comb(fps=Fraction(24), first_s=float(times_s[7]), open_s=1.0))
@@ -643,7 +652,9 @@ def test_what_moves_over_many_rows_is_whole_and_what_rests_beside_it_stays(step:
     for image, shift in zip(frames, (0, px // 2, px), strict=True):
         image[:, moving_cols] = np.roll(still[:, moving_cols], shift, axis=0)
     before, after = (
-        LightPlate(light="a", number=n, time_s=float(n), picture=made(frames[2 * n]), seen=np.ones(rows, np.bool_))
+        LightPlate(
+            light="a", number=n, time_s=float(n), picture=mixture_of(frames[2 * n]), seen=np.ones(rows, np.bool_)
+        )
         for n in (0, 1)
     )
     moves = np.zeros((rows // step, cols // step), np.bool_)

@@ -18,7 +18,7 @@ from psvideo.plates.ambient.ambient_blocks import block_px, no_blocks, over_band
 from psvideo.plates.ambient.ambient_kernel import average_rows, measure_rows
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, TrueClock
 from psvideo.synth.camera.noise import NOISELESS, frame_rng
@@ -259,7 +259,7 @@ def test_dark_slots_that_are_torn_or_seen_in_part_do_no_harm(make_plan: PlanMake
 def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
     take = shoot(plan, dimmed)
     tint = np.array([1.0, 0.6, 0.3], np.float32)
-    coloured = [replace(plate, picture=made(plate.image[..., None] * tint)) for plate in take.plates]
+    coloured = [replace(plate, picture=mixture_of(plate.image[..., None] * tint)) for plate in take.plates]
     grey = {plate.flash.index: plate.image for plate in take.without_ambient()}
     for plate in replace(take, plates=coloured).without_ambient():
         assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4
@@ -327,7 +327,9 @@ def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
     def dark(index: int, light: np.ndarray | float) -> Plate:
         flash = Flash(index=index, slot=0, lights={}, start_s=index / 30, duration_s=1e-3, complete=True)
         image = (light + 2e-3 * rng.standard_normal(size)).astype(np.float32)
-        return Plate(flash=flash, picture=made(image), shares=row, middles_s=row * index / 30, seen=np.ones(240, bool))
+        return Plate(
+            flash=flash, picture=mixture_of(image), shares=row, middles_s=row * index / 30, seen=np.ones(240, bool)
+        )
 
     waves = 1 + 0.05 * np.sin(np.arange(240)[:, None] * np.linspace(0.1, 0.6, 64))  # every length that a window turns
     averaged = None
@@ -344,7 +346,7 @@ def test_levels_of_blocks_are_means_and_change_steadily_between_their_middles(sh
     image = rng.uniform(0.01, 0.05, shape).astype(np.float32)
     rows, cols = shape[0] // block, shape[1] // block
     coarse, means, clipped = no_blocks(shape), np.empty(shape[0]), np.empty(shape[0], np.bool_)
-    bound = made(image).bound()
+    bound = mixture_of(image).bound()
     over_bands(lambda a, b: measure_rows(bound.mix, block, a, b, means, clipped, coarse), shape)
     edges = [np.append(np.arange(count) * block, size) for count, size in ((rows, shape[0]), (cols, shape[1]))]
     true = np.array(

@@ -19,7 +19,7 @@ from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, light_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.steps.lighting import Lighting
@@ -151,7 +151,7 @@ def passed(how: Aligning, *, hidden: slice = slice(0, 0)) -> Round:
         for n, (name, row) in enumerate(zip(NAMES, MATRIX, strict=True)):
             time_s = (6 * (number - 2) + n - 2) * PITCH_S
             light = 0.8 * (FACES @ row)[passing(time_s)]
-            picture = made(np.asarray(light + rng.normal(0, 0.002, light.shape), np.float32))
+            picture = mixture_of(np.asarray(light + rng.normal(0, 0.002, light.shape), np.float32))
             seen = np.ones(len(light), np.bool_)
             seen[hidden] = number != 2 or name != NAMES[0]
             plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))

@@ -14,7 +14,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Misfit
 from psvideo.model.timing import Timing
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.result import accuracy
 from psvideo.report.judgement import Judgement
@@ -91,7 +91,7 @@ def found_in(images: np.ndarray, ways: np.ndarray | None = None) -> Astray | Non
         lights=tuple(Light(name=f"L{n}", direction=(float(x), float(y), float(z))) for n, (x, y, z) in enumerate(ways))
     )
     plates = [
-        LightPlate(light=f"L{n}", number=1001, time_s=float(n), picture=made(image), seen=np.ones(rows, np.bool_))
+        LightPlate(light=f"L{n}", number=1001, time_s=float(n), picture=mixture_of(image), seen=np.ones(rows, np.bool_))
         for n, image in enumerate(images)
     ]
     points = rig_points(plan_of(lights, rows, cols), rig, height_px=rows, width_px=cols, channels=1)

@@ -10,7 +10,7 @@ from psvideo.plates.align.between import columns_in
 from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, JUST_BELOW, blend_rows
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 
 ROWS, COLS = 22, 31
 COARSE = 11, 16
@@ -111,8 +111,8 @@ def test_a_packed_picture_is_good_to_half_a_step_and_black_stays_black(least: fl
     image = np.random.default_rng(9).uniform(least, most, (70, 12, 3)).astype(np.float32)
     image[5] = 0
     image[6, 0, 0], image[6, 1, 0] = least, most
-    back = packed(made(image), saturation=100.0).image()
+    back = packed(mixture_of(image), saturation=100.0).image()
     span = float(image.min()), float(image.max())
-    assert (packed(made(image), saturation=100.0, span=span).image() == back).all()  # found while it is made
+    assert (packed(mixture_of(image), saturation=100.0, span=span).image() == back).all()  # found while it is made
     assert np.abs(back - image).max() <= 0.502 * (most - min(least, 0)) / 65534  # floats round too
     assert (back[5] == 0).all()

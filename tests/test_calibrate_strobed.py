@@ -17,7 +17,7 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.rows.row_profiles import collect
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -35,7 +35,7 @@ def measured(plan: Plan, *, seed: int = 0, frames: int = 60) -> StrobedReadout:
     shot = expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, seed=seed)
     indices, profiles = collect(MemoryFrame(n, image) for n, image in zip(shot.indices, shot.frames, strict=True))
     unknown = replace(plan, camera=replace(camera, readout_s=None))
-    return readout_of(unknown, find_timing(unknown, indices, profiles), frames=frames)
+    return readout_of(unknown, timing_from_rows(unknown, indices, profiles), frames=frames)
 
 
 @pytest.mark.parametrize("share", [0.4, -0.8, 1.0])
@@ -82,7 +82,7 @@ def test_a_tolerance_that_is_given_counts_instead_of_the_plan_s(
 
 def test_a_timing_that_took_the_plan_s_word_is_no_measurement(make_plan: PlanMaker) -> None:
     plan = make_plan(mode="synced", readout=0.0)
-    timing = find_timing(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
+    timing = timing_from_rows(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
     with pytest.raises(PsvideoError, match="does not show the readout"):
         readout_of(plan, timing, frames=8)
 

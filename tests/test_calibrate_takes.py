@@ -12,7 +12,7 @@ from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 
 from psvideo.cli.app import main
 from psvideo.formats.rig_toml import read_rig
-from psvideo.report.of_rigs import LightOfTake, RigResult, worst_rigs_first
+from psvideo.report.rigs_report import LightOfTake, RigResult, worst_rigs_first
 from psvideo.report.stood_still import changes
 
 DIRECTIONS = {"key": (0.3, 0.4, 0.87), "left": (-0.5, 0.2, 0.84), "low": (0.1, -0.4, 0.9)}

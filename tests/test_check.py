@@ -25,7 +25,7 @@ from psvideo.model.timing import Timing
 from psvideo.report.observe.focus import sharpest_blur_px
 from psvideo.runs.many_takes.arriving import takes_in, whole_takes
 from psvideo.runs.steps.checked import Check
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
 SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")
@@ -110,9 +110,9 @@ def test_more_frames_are_looked_at_before_a_strobe_is_said_to_be_missing(
         asked.append(len(take.numbers))
         if len(asked) == 1:
             raise NoStrobeError("no strobe in so few")
-        return find_take_timing(take, **others)
+        return find_timing(take, **others)
 
-    monkeypatch.setattr("psvideo.runs.check.find_take_timing", only_in_many)
+    monkeypatch.setattr("psvideo.runs.check.find_timing", only_in_many)
     monkeypatch.setattr("psvideo.runs.check.LEAST_FRAMES", 1)
     monkeypatch.setattr("psvideo.runs.check.ROUNDS", 2)
     assert run("check", shot("good"), "--json") == 0

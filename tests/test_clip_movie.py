@@ -26,7 +26,7 @@ from psvideo.model.plan import Plan
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import scheduled
 from psvideo.runs.steps.output import take_rate
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 from psvideo.synth import TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -445,7 +445,7 @@ def test_frames_of_a_rate_that_changes_are_taken_at_their_own_times(tmp_path: Pa
     assert clip.plan.camera.fps == RATE
     assert clip.filmed_plan.camera.fps == plan.camera.fps
     assert any("varies from 23.9" in warning and "29.9" in warning for warning in clip.warnings)
-    timing = find_take_timing(Take(clip=clip, numbers=clip.numbers))
+    timing = find_timing(Take(clip=clip, numbers=clip.numbers))
     assert timing.dropped_frames == ()
     assert timing.clock_offset_ppm == pytest.approx(40.0, abs=20.0)
     truth_s = 0.0123 + np.arange(200) * (plan.flashes[0].duration_s + plan.dark_s) * (1 + 40e-6)

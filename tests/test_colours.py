@@ -20,7 +20,7 @@ from psvideo.model.irradiance.colours import WHITE, Unmixing, lamps_of, unmixing
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.plates.several_lights.unmixed import slot_names, unmixed, unmixing_note
 
@@ -73,7 +73,7 @@ def flashed(plan: Plan, rig: Rig, normals: np.ndarray, albedo: np.ndarray) -> Ro
                 light=name,
                 number=1001,
                 time_s=0.01 * slot,
-                picture=made(image.astype(np.float32)),
+                picture=mixture_of(image.astype(np.float32)),
                 seen=np.ones(len(image), np.bool_),
                 saturation=10.0,
             )
@@ -149,7 +149,7 @@ def test_a_clipped_sample_clips_what_it_counts_in(make_plan: MakePlan) -> None:
     first = shot.plates[0]
     image = first.image.copy()
     image[0, 7, 1] = first.saturation
-    shot = replace(shot, plates=(replace(first, picture=made(image)), *shot.plates[1:]))
+    shot = replace(shot, plates=(replace(first, picture=mixture_of(image)), *shot.plates[1:]))
     for plate in unmixed(shot, taken_apart(plan, rig)).plates:
         assert plate.image[0, 7, 1] >= plate.saturation
         assert plate.image[0, 7, 0] < plate.saturation

@@ -22,7 +22,7 @@ from psvideo.export.programs.otio import Footage, Images, timeline_text
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 
 otio = pytest.importorskip("opentimelineio")
@@ -113,7 +113,7 @@ def test_a_row_that_one_light_lacks_is_missing_in_the_sum() -> None:
     def plate(name: str, seen: list[bool]) -> LightPlate:
         rows = np.array(seen)
         image = np.ones((3, 2), np.float32) * rows[:, None]
-        return LightPlate(light=name, number=1, time_s=0.0, picture=made(image), seen=rows)
+        return LightPlate(light=name, number=1, time_s=0.0, picture=mixture_of(image), seen=rows)
 
     one = Round(number=1, plates=(plate("a", [True, True, False]), plate("b", [True, True, True])))
     total = beauty_of(one, Mix())

@@ -10,7 +10,7 @@ from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.facts import InstantFacts, instant_facts
@@ -142,7 +142,9 @@ def test_the_report_names_the_worst_instants() -> None:
     before: Sample | None = None
     for n, gain in enumerate(gains):
         one = surface(rng, gain=gain)
-        plate = LightPlate(light="a", number=n, time_s=float(n), picture=made(one.albedo), seen=np.ones(ROWS, np.bool_))
+        plate = LightPlate(
+            light="a", number=n, time_s=float(n), picture=mixture_of(one.albedo), seen=np.ones(ROWS, np.bool_)
+        )
         now = sample_of(one)
         changed: Change | None = None if before is None else change(before, now)
         facts.append(instant_facts(Round(number=1001 + n, plates=(plate,)), one, None, changed))

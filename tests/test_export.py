@@ -34,7 +34,7 @@ from psvideo.model.choices import Compression
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate
 
 TAGS = Tags(fps=Fraction(30000, 1001), colour="lin_rec709_scene", plan_sha256="ab" * 32, rig_sha256="cd" * 32)
@@ -127,12 +127,14 @@ def test_sixteen_bit_normals_decode_to_what_was_encoded(vectors: np.ndarray) -> 
 def test_a_missing_row_is_zero_in_the_plates_own_channel(tmp_path: Path) -> None:
     seen = np.array([True, True, False, True])
     image = np.full((4, 5, 3), 0.25, np.float32) * seen[:, None, None]
-    plate = LightPlate(light="key", number=1001, time_s=0.5, picture=made(image), seen=seen)
+    plate = LightPlate(light="key", number=1001, time_s=0.5, picture=mixture_of(image), seen=seen)
     write_plate(tmp_path, "take", plate, TAGS)
     _, planes = read(tmp_path / "key" / "take_key.1001.exr")
     assert set(planes) == {"R", "G", "B", "valid"}
     assert planes["valid"][:, 0].tolist() == [1, 1, 0, 1]
-    whole = LightPlate(light="key", number=1002, time_s=0.5, picture=made(image[..., 0]), seen=np.ones(4, np.bool_))
+    whole = LightPlate(
+        light="key", number=1002, time_s=0.5, picture=mixture_of(image[..., 0]), seen=np.ones(4, np.bool_)
+    )
     write_plate(tmp_path, "take", whole, TAGS)
     _, planes = read(tmp_path / "key" / "take_key.1002.exr")
     assert set(planes) == {"Y"}
@@ -146,7 +148,7 @@ def test_a_flash_by_itself_says_which_lights_it_held(tmp_path: Path) -> None:
         "take",
         Plate(
             flash=flash,
-            picture=made(np.zeros((4, 3), np.float32)),
+            picture=mixture_of(np.zeros((4, 3), np.float32)),
             shares=rows[None].astype(np.float64),
             middles_s=np.zeros((1, 4)),
             seen=rows,

@@ -19,7 +19,7 @@ from psvideo.cli.options.typed import parse_instants
 from psvideo.clip import decoded_once, kept
 from psvideo.clip.in_file import RowsInFile
 from psvideo.errors import UsageError
-from psvideo.export.sequences.planes import Made, planes_of
+from psvideo.export.sequences.planes import InstantPictures, planes_of
 from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
 from psvideo.model.plan import Plan
@@ -33,7 +33,7 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.gather import gather
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.runs.delivery.relit import TILT, TURN_S, blur_of
 from psvideo.runs.instants import depths
@@ -276,7 +276,7 @@ def test_the_relit_movie_is_blurred_as_the_plates_are(make_plan: PlanMaker) -> N
         rows = np.ones(12, bool)
         lit = [np.asarray(1.4 * (way @ normal) * surface, np.float32) for way in ways]
         return tuple(
-            LightPlate(light=name, number=1007, time_s=0.1, picture=made(image), seen=rows)
+            LightPlate(light=name, number=1007, time_s=0.1, picture=mixture_of(image), seen=rows)
             for name, image in zip("abcd", lit, strict=True)
         )
 
@@ -294,7 +294,7 @@ def test_motion_vectors_are_named_and_signed_as_the_program_wants_them() -> None
     flat = np.zeros((2, 2, 3), np.float32)
     surface = Surface(normals=flat, albedo=flat, valid=np.ones((2, 2), bool))
     motion = np.broadcast_to(np.array([1.0, 2.0, -3.0, -4.0], np.float32), (2, 2, 4))
-    made = Made(surface=surface, space=Space(), motion=lambda: motion, program="nuke")
+    made = InstantPictures(surface=surface, space=Space(), motion=lambda: motion, program="nuke")
     plain = {name: float(plane[0, 0]) for name, plane in planes_of("motion", made).items()}
     assert plain == {"forward.u": 1, "forward.v": 2, "backward.u": -3, "backward.v": -4}
     blender = [float(plane[0, 0]) for plane in planes_of("motion", replace(made, program="blender")).values()]

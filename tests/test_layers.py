@@ -198,7 +198,7 @@ PRINTED_WITH = {
     "psvideo.capture.tables.shoot_report",
     "psvideo.formats.clocks_json.clocks_record",
     "psvideo.formats.timing_json.timing_record",
-    "psvideo.report.of_rigs.rigs_record",
+    "psvideo.report.rigs_report.rigs_record",
     "psvideo.report.run_report.report_record",
     "psvideo.strobe.program_words.describe_program",
     "psvideo.strobe.program_words.program_record",

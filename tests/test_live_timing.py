@@ -17,7 +17,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.lamps.true_flashes import TrueFlash
 
@@ -98,7 +98,7 @@ def test_live_agrees_with_offline_and_truth(make_plan: PlanMaker, what: str) -> 
     assert found.follower.state == "locked"
     assert found.timing.order == "marker"
     assert np.abs(apart_rows(found.timing, np.array([flash.start_s for flash in shot.flashes]), plan)).max() < LIVE_ROWS
-    offline = find_timing(plan, np.arange(len(values)), values)
+    offline = timing_from_rows(plan, np.arange(len(values)), values)
     assert np.abs(apart_rows(found.timing, offline.start_s, plan)).max() < LIVE_ROWS
     names = {round(flash.start_s / plan.dark_s): flash.lights for flash in offline.flashes}
     assert all(names[round(flash.start_s / plan.dark_s)] == flash.lights for flash in found.timing.flashes)

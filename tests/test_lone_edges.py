@@ -8,7 +8,7 @@ from psvideo.plates.align.doubt.lone_edges import FOLLOWED, InstantSketch, unsur
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity.flow import TOE, Sketch
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.moving_doubt import moving_doubt_deg
@@ -114,7 +114,7 @@ def filmed(lefts: tuple[int, int, int], changed: float) -> tuple[np.ndarray, flo
             noisy = np.asarray(image + rng.normal(0, 0.002, image.shape), np.float32)
             time_s = (4 * (number - 2) + n - 1) * 0.009
             seen = np.ones(ROWS, np.bool_)
-            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=made(noisy), seen=seen))
+            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=mixture_of(noisy), seen=seen))
     one = list(aligned(plates, LIGHTS, Aligning(), first=1))[1]
     lit = Illumination(directions=directions, intensities=np.ones((3, 1)), names=LIGHTS)
     surface = Solving().solve([plate.image for plate in one.plates], lit, unsure=one.unsure)

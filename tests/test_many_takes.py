@@ -9,7 +9,7 @@ import pytest
 
 from psvideo.errors import PsvideoError
 from psvideo.report.judgement import Judgement, verdict_of
-from psvideo.report.of_takes import TakeResult, takes_page, worst_first
+from psvideo.report.takes_report import TakeResult, takes_page, worst_first
 from psvideo.runs.many_takes.handed_out import do_piece, result_of_future
 from psvideo.runs.many_takes.normals_of_takes import _counts
 from psvideo.runs.many_takes.several_takes import result_of, several_takes, whole_options

@@ -24,7 +24,7 @@ from psvideo.model.timing import Flash, Timing
 from psvideo.plates.align.packed import packed
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing import ready_mixture
-from psvideo.plates.mixing.mixture import Mixture, made
+from psvideo.plates.mixing.mixture import Mixture, mixture_of
 from psvideo.plates.mixing.several_pictures import combined
 from psvideo.plates.split import split
 
@@ -208,7 +208,7 @@ def test_what_is_combined_is_the_sum_of_its_parts_and_the_frames_are_shared() ->
 
 def test_a_picture_in_memory_is_handed_out_as_it_is() -> None:
     image = np.random.default_rng(0).random((6, 8, 3), np.float32) * 3
-    picture = made(image)
+    picture = mixture_of(image)
     assert picture.image() is image
     assert packed(shot("8 bits"), 1.0).frames[0].codes.dtype == np.uint8, "what its frames hold is not packed"
     doubled = combined([picture], [2.0], ceiling=4.0)

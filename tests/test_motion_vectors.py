@@ -10,7 +10,7 @@ import pytest
 
 from psvideo.compute import spilled
 from psvideo.compute.spilled import lie_in_files
-from psvideo.export.sequences.planes import Made, planes_of
+from psvideo.export.sequences.planes import InstantPictures, planes_of
 from psvideo.export.space import Space
 from psvideo.model.surface import Surface
 from psvideo.plates.align.velocity.correlation import displacements
@@ -100,7 +100,7 @@ def test_vectors_are_made_for_their_own_file_only() -> None:
         albedo=np.zeros((ROWS, COLS), np.float16),
         valid=np.ones((ROWS, COLS), np.bool_),
     )
-    made = Made(surface=surface, space=Space(), motion=never)
+    made = InstantPictures(surface=surface, space=Space(), motion=never)
     assert len(planes_of("normals", made)) == 3
     with pytest.raises(AssertionError, match=r"^made$"):
         planes_of("motion", made)

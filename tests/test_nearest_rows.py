@@ -8,7 +8,7 @@ import pytest
 
 from psvideo.model.camera import Camera
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.nearest_rows import LATER, MOST_LATER, has_blind_time, with_nearest_rows
 
 ROWS = 8
@@ -19,7 +19,7 @@ def plate(number: int, missing: Sequence[int], *, light: str = "key") -> LightPl
     seen = np.ones(ROWS, np.bool_)
     seen[list(missing)] = False
     image = np.where(seen[:, None], np.float32(number), np.float32(0)) * np.ones((1, 3), np.float32)
-    return LightPlate(light=light, number=number, time_s=float(number), picture=made(image), seen=seen)
+    return LightPlate(light=light, number=number, time_s=float(number), picture=mixture_of(image), seen=seen)
 
 
 def test_whole_plates_pass_as_they_are_and_at_once() -> None:

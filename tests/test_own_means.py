@@ -9,7 +9,7 @@ from psvideo.plates.align.velocity.flow import Sketch, sketch_of
 from psvideo.plates.align.velocity.followed import Pair
 from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 
 SHAPE, STEP_PX, SIDE, HEM = (72, 96), 3, 44, 9
 
@@ -32,7 +32,7 @@ def _sketch(light: int, step: int) -> Sketch:
     grain[14 : 14 + SIDE, left : left + SIDE] = square
     image = np.asarray(grain, np.float32)
     plate = LightPlate(
-        light=f"l{light}", number=step, time_s=float(step), picture=made(image), seen=np.ones(SHAPE[0], np.bool_)
+        light=f"l{light}", number=step, time_s=float(step), picture=mixture_of(image), seen=np.ones(SHAPE[0], np.bool_)
     )
     return sketch_of(plate, white=1.0)
 

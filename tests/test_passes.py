@@ -11,7 +11,7 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.model.rig import Light
 from psvideo.solve.normals.illumination import illumination
 from psvideo.solve.normals.solving import Solving
-from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
+from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of
 
 SIZE, FINE, NOISE = 64, 4, 0.002
 DIRECTIONS = np.array([[0, 0, 1], [0.6, 0, 0.8], [-0.6, 0, 0.8], [0, 0.6, 0.8], [0, -0.6, 0.8]])

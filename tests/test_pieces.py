@@ -28,7 +28,7 @@ from psvideo.model.rig import Rig
 from psvideo.model.rows.shutter import Pulse, row_weights
 from psvideo.plates import gather as gather_module
 from psvideo.plates import spread
-from psvideo.plates.align import held
+from psvideo.plates.align import light_history
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
 from psvideo.plates.spread import rounds_spread, spread_over
@@ -185,7 +185,7 @@ def same_in_pieces(clip: Path, folder: Path, words: tuple[str, ...], **options: 
 
 
 def test_a_run_in_pieces_gives_the_bytes_of_one_at_one_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (held, pieces, steady):  # else half a hundred rounds were needed
+    for module in (light_history, pieces, steady):  # else half a hundred rounds were needed
         monkeypatch.setattr(module, "POOLED_ROUNDS", 4)
     clip = filmed(tmp_path, frames=100, speed_px=0.2)
     options: dict[str, Any] = {"aov": ["beauty"], "with_ambient": True, "denoise": 2, "preview": ()}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ball_delivery import deliver
 
-from psvideo.export.sequences.planes import PICTURES, Made, planes_of
+from psvideo.export.sequences.planes import PICTURES, InstantPictures, planes_of
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import Space
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES
@@ -14,13 +14,13 @@ from psvideo.model.surface import Surface
 from psvideo.page.folders import show_of
 from psvideo.page.show import index_of
 from psvideo.solve.depth import Depth, View
-from psvideo.solve.passes.made import Passes
+from psvideo.solve.passes.asked_passes import Passes
 
 ROWS, COLS = 3, 4
 OF_AN_INSTANT = (*ALWAYS, *AOVS)
 
 
-def made() -> Made:
+def made() -> InstantPictures:
     normals = np.zeros((ROWS, COLS, 3), np.float32)
     normals[..., 2] = 1
     plane = np.full((ROWS, COLS), 0.5, np.float32)
@@ -30,7 +30,7 @@ def made() -> Made:
     depth = Depth(depth=plane, cut_east=none, cut_south=none, parts=1, metric=True, view=View())
     passes = Passes(reach=source, specular=plane, alpha=plane)
     age_s = np.linspace(0, 0.1, ROWS)
-    return Made(
+    return InstantPictures(
         surface=surface,
         space=Space(),
         beauty=plane,
@@ -63,7 +63,9 @@ def test_planes_are_the_channels_that_the_table_says(name: str) -> None:
 )
 def test_what_was_not_made_is_not_written(name: str) -> None:
     whole = made().surface
-    bare = Made(surface=Surface(normals=whole.normals, albedo=whole.albedo, valid=whole.valid), space=Space())
+    bare = InstantPictures(
+        surface=Surface(normals=whole.normals, albedo=whole.albedo, valid=whole.valid), space=Space()
+    )
     with pytest.raises(ValueError, match=f"^{name} is to be written and was not made$"):
         planes_of(name, bare)
 

@@ -14,7 +14,7 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Reflectance, Subject, Surface
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import subject_of
 from psvideo.solve.normals.illumination import Illumination, illumination
@@ -176,7 +176,7 @@ def test_a_take_looks_at_what_is_sure_in_its_rounds() -> None:
     plan = Plan(camera=camera, flashes=flashes, dark_s=1e-3)
     rig = Rig(lights=tuple(Light(name=name, direction=at) for name, at in zip(names, lamps, strict=True)))
     plates = tuple(
-        LightPlate(light=name, number=1001, time_s=0.0, picture=made(picture), seen=np.ones(SIZE, np.bool_))
+        LightPlate(light=name, number=1001, time_s=0.0, picture=mixture_of(picture), seen=np.ones(SIZE, np.bool_))
         for name, picture in zip(names, pictures, strict=True)
     )
     unsure = np.zeros((len(names), SIZE, SIZE), np.float32)

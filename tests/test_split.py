@@ -22,7 +22,7 @@ from psvideo.plates import hudon2015
 from psvideo.plates.ambient import ambient_off
 from psvideo.plates.sequence import Round, coming, gathered, light_plates
 from psvideo.plates.split import Plate, split
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -246,7 +246,7 @@ def test_the_clips_of_another_simulator_give_its_true_plates(clip: str, shared_d
     files = sorted((folder / "frames").glob("*.png"))
     codes = [read_picture(file, cv2.IMREAD_UNCHANGED)[..., ::-1].astype(np.float32) for file in files]
     frames = [MemoryFrame(n, np.ascontiguousarray((code - black) / (white - black))) for n, code in enumerate(codes)]
-    timing = find_timing(plan, *collect(frames))
+    timing = timing_from_rows(plan, *collect(frames))
     plates = list(split(iter(frames), plan.camera, timing))
     plates = list(without_ambient(plates))
     truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]

@@ -15,7 +15,7 @@ from psvideo.compute.spilled import in_file
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import POOLED_ROUNDS
 from psvideo.solve import steady
 from psvideo.solve.instants import surfaces
@@ -207,7 +207,7 @@ def standing_bust(lights: int, align: Aligning, *, level: float = 1.0) -> list[S
                 image = np.minimum(plate + electrons / 20000, 1).astype(np.float32)
                 time_s = (number + n / (lights + 1)) * 0.006
                 seen = np.ones(len(image), np.bool_)
-                yield LightPlate(light=light, number=number, time_s=time_s, picture=made(image), seen=seen)
+                yield LightPlate(light=light, number=number, time_s=time_s, picture=mixture_of(image), seen=seen)
 
     rounds = aligned(film(), plan.lights, align, first=1001)
     return [instant.surface for instant in surfaces(rounds, plan, stage.rig)]

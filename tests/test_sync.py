@@ -18,7 +18,7 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_until
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.synth import Exposure, Noise, TrueClock, expose
@@ -46,7 +46,7 @@ def shoot(plan: Plan, *, frames: int = 60, phase_s: float = 0.0123, ppm: float =
 
 def timing_of(plan: Plan, shot: Exposure, **options: str) -> Timing:
     indices, profiles = collect(MemoryFrame(n, image) for n, image in zip(shot.indices, shot.frames, strict=True))
-    return find_timing(plan, indices, profiles, **options)  # type: ignore[arg-type]
+    return timing_from_rows(plan, indices, profiles, **options)  # type: ignore[arg-type]
 
 
 def errors_rows(timing: Timing, shot: Exposure) -> FloatArray:
@@ -123,7 +123,7 @@ def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_da
     assert white is not None
     pictures = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((folder / "frames").glob("*.png"))]
     profiles = np.array([(p.reshape(len(p), -1).mean(axis=1) - black) / (white - black) for p in pictures])
-    timing = find_timing(plan, np.arange(len(pictures)), profiles, clip=clip)
+    timing = timing_from_rows(plan, np.arange(len(pictures)), profiles, clip=clip)
     truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
     assert [next(iter(flash.lights), None) for flash in timing.flashes] == [flash["light"] for flash in truth]
     assert [flash.complete for flash in timing.flashes] == [flash["complete"] for flash in truth]
@@ -167,7 +167,7 @@ def test_a_synced_clip_begins_with_the_light_that_is_named(
 ) -> None:
     plan = make_plan(mode="synced", readout=0.0, dark=dark)
     names = list(plan.lights)
-    timing = find_timing(plan, np.arange(len(order.split())), np.zeros((4, 2)), first_light=first)
+    timing = timing_from_rows(plan, np.arange(len(order.split())), np.zeros((4, 2)), first_light=first)
     assert ["+".join(flash.lit) or "-" for flash in timing.flashes] == order.split(), names
 
 
@@ -175,10 +175,10 @@ def test_lights_that_flash_together_are_named_together(make_plan: PlanMaker) -> 
     plan = make_plan(mode="synced", readout=0.0, dark=False)
     pair = replace(plan.flashes[1], lights={"left": 1.0, "right": 0.5})
     plan = replace(plan, flashes=(plan.flashes[0], pair, plan.flashes[2]))
-    timing = find_timing(plan, np.arange(3), np.zeros((3, 2)), first_light="right+left")
+    timing = timing_from_rows(plan, np.arange(3), np.zeros((3, 2)), first_light="right+left")
     assert timing.flashes[0].lit == ("left", "right")
     with pytest.raises(UsageError, match=r"its flashes are key, left\+right, right"):
-        find_timing(plan, np.arange(3), np.zeros((3, 2)), first_light="left")
+        timing_from_rows(plan, np.arange(3), np.zeros((3, 2)), first_light="left")
 
 
 @pytest.mark.parametrize("phase_s", [0.0002, 0.002, 0.006])
@@ -224,7 +224,7 @@ def test_footage_that_is_not_strobed_is_not_timed(make_plan: PlanMaker) -> None:
     rng = np.random.default_rng(5)
     steady = 0.3 + 0.2 * rng.random(plan.camera.height_px) + 0.01 * rng.standard_normal((60, plan.camera.height_px))
     with pytest.raises(PsvideoError, match="no strobe like the plan's was found"):
-        find_timing(plan, np.arange(60), steady)
+        timing_from_rows(plan, np.arange(60), steady)
 
 
 def test_another_plans_footage_is_not_timed(make_plan: PlanMaker) -> None:
@@ -235,7 +235,7 @@ def test_another_plans_footage_is_not_timed(make_plan: PlanMaker) -> None:
 
 def test_synced_footage_has_one_flash_a_frame_in_the_plans_order(make_plan: PlanMaker) -> None:
     plan = make_plan(mode="synced", readout=0.7)
-    timing = find_timing(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
+    timing = timing_from_rows(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
     assert [flash.slot for flash in timing.flashes] == [0, 1, 2, 3, 0, 1, 2, 3]
     camera = replace(plan.camera, readout_s=timing.row_time_s * plan.camera.height_px)
     weights = row_weights(camera, timing.start_s, timing.duration_s, frames=range(8))

@@ -10,7 +10,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -87,7 +87,7 @@ def test_flashes_beside_a_break_are_complete_only_where_they_fired(
 ) -> None:
     plan = make_plan(height_px=48, width_px=12, lights=tuple("abcde"[:lights]), shutter=shutter, readout=readout)
     fired, profiles = broken_off(plan, seed, frames=frames, stops=stops, begins=begins)
-    timing = find_timing(plan, np.arange(frames), profiles)
+    timing = timing_from_rows(plan, np.arange(frames), profiles)
     off, period_s = off_rows(plan, timing, fired, frames), plan.camera.frame_period_s
     assert off.max() < max(0.1, 4 * timing.phase_error_rows)
     inside = [one for one in fired if one.lights and 2 < one.start_s / period_s < frames - 3]
@@ -120,7 +120,7 @@ def test_a_strobe_that_moves_by_many_frames_and_a_little_started_again(
     begins_s = first_s - many * period_s + rest * plan.shortest_flash_s
     begins_s += cycle_s * np.ceil(((stops + 0.5) * period_s - begins_s) / cycle_s)
     fired, profiles = broken_off(plan, 3, frames=frames, stops=stops, begins=begins_s / period_s)
-    timing = find_timing(plan, np.arange(frames), profiles)
+    timing = timing_from_rows(plan, np.arange(frames), profiles)
     assert off_rows(plan, timing, fired, frames).max() < 4 * timing.phase_error_rows < 0.8
     if rest:
         assert not timing.dropped_frames
@@ -137,7 +137,7 @@ def test_a_strobe_that_stops_within_a_frame_leaves_no_missing_frames(
 ) -> None:
     plan = make_plan(height_px=48, width_px=12, lights=tuple("abcd"))
     _, profiles = broken_off(plan, 3, frames=frames, stops=stops, begins=frames + 9.0)
-    timing = find_timing(plan, np.arange(frames), profiles)
+    timing = timing_from_rows(plan, np.arange(frames), profiles)
     assert not timing.dropped_frames
     assert not timing.repeated_frames
     last_s = max(one.start_s for one in timing.flashes if one.complete and one.lights)

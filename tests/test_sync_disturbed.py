@@ -19,10 +19,10 @@ from psvideo.model.rows.ripple import Exposures
 from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.plates.gather import gather
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.open_take import open_take
 from psvideo.sync.rowfit.beat import FoundClock
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 from psvideo.sync.verdict.remarks import OF_MISNAMED_PPM
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 
@@ -61,7 +61,7 @@ def shoot(plan: Plan, *, frames: int = 72, ppm: float = 30.0, drift: float = 0.0
 def timing_of(plan: Plan, shot: Exposure, *, indices: object = None, **options: object) -> Timing:
     """Time the shot by its frames' true indices, unless others are said."""
     said = np.arange(len(shot.frames)) if indices is None else np.asarray(indices)
-    return find_timing(plan, said, shot.frames.mean(axis=2, dtype=np.float64), **options)  # type: ignore[arg-type]
+    return timing_from_rows(plan, said, shot.frames.mean(axis=2, dtype=np.float64), **options)  # type: ignore[arg-type]
 
 
 def rms_rows(timing: Timing, shot: Exposure, plan: Plan, scale: float = 1.0) -> float:
@@ -198,7 +198,9 @@ def test_rows_that_are_blurred_are_not_taken_for_tails(plan: Plan) -> None:
     shot = shoot(plan)
     profiles = shot.frames.mean(axis=2, dtype=np.float64)
     padded = np.pad(profiles, ((0, 0), (1, 1)), mode="edge")
-    timing = find_timing(plan, np.arange(len(profiles)), 0.25 * padded[:, :-2] + 0.5 * profiles + 0.25 * padded[:, 2:])
+    timing = timing_from_rows(
+        plan, np.arange(len(profiles)), 0.25 * padded[:, :-2] + 0.5 * profiles + 0.25 * padded[:, 2:]
+    )
     assert (timing.rise_s, timing.fall_s) == (0.0, 0.0)
     assert rms_rows(timing, shot, plan) < 0.05
 
@@ -270,7 +272,7 @@ def test_a_hole_that_the_numbering_shows_is_reported_once(plan: Plan) -> None:
 def test_a_repeated_frame_takes_no_time(plan: Plan, tmp_path: Path) -> None:
     shot = shoot(plan)
     frames = np.insert(shot.frames, 41, shot.frames[40], axis=0)
-    timing = find_timing(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
+    timing = timing_from_rows(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
     assert timing.repeated_frames == (41,)
     assert timing.dropped_frames == ()
     assert rms_rows(timing, shot, plan) < 0.05
@@ -283,7 +285,7 @@ def test_a_frame_that_another_stands_in_for_is_repeated_and_missing(plan: Plan) 
     shot = shoot(plan)
     frames = shot.frames.copy()
     frames[41] = frames[40]
-    timing = find_timing(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
+    timing = timing_from_rows(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
     assert timing.repeated_frames == (41,)
     assert timing.dropped_frames == (DroppedFrames(after=41, count=1),)
     assert places_in_time(timing, range(72))[42] == 42
@@ -425,7 +427,7 @@ def test_flashes_of_two_lights_that_clip_together_are_neither_flicker_nor_tails(
     frames = (MemoryFrame(n, image) for n, image in enumerate(shot.frames))
     index, profiles, doubt = collect_with_doubt(frames)
     assert (shot.frames >= 0.998).mean() > 0.4
-    timing = find_timing(plan, index, profiles, doubt=doubt)
+    timing = timing_from_rows(plan, index, profiles, doubt=doubt)
     true_s = np.array([flash.start_s for flash in shot.flashes])
     error_s = np.array([np.abs(true_s - flash.start_s).min() for flash in timing.flashes])
     assert np.sqrt(np.mean(error_s**2)) < 0.01 * plan.camera.row_time_s
@@ -481,7 +483,7 @@ def test_flicker_alone_is_no_strobe(make_plan: PlanMaker) -> None:
     plan, rng = make_plan(height_px=64, width_px=COLUMNS), np.random.default_rng(5)
     rows = (0.3 + 0.2 * rng.random(64)) * (1 + 0.3 * np.sin(np.arange(40) / 3))[:, None]
     with pytest.raises(PsvideoError, match="All rows change together"):
-        find_timing(plan, np.arange(40), rows + 1e-3 * rng.standard_normal(rows.shape))
+        timing_from_rows(plan, np.arange(40), rows + 1e-3 * rng.standard_normal(rows.shape))
 
 
 def test_bends_add_up_and_run_straight_on_beyond_the_last_knot() -> None:
@@ -501,7 +503,7 @@ def test_plates_of_a_clip_with_frames_missing_unseen_are_those_of_the_whole_clip
     for number, frame in enumerate(shot.frames, start=1):
         write_exr(tmp_path / f"frame.{number:04d}.exr", {"Y": frame}, half=False)
     take = open_take(tmp_path)
-    timing = find_take_timing(take)
+    timing = find_timing(take)
     assert timing.dropped_frames == (DroppedFrames(after=20, count=1),)
     last = list(gather(take, timing))[-1]
     for plate, slot in zip(last.plates, plan.lit_slots, strict=True):

@@ -8,7 +8,7 @@ import pytest
 
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.standard_error import standard_error_of
 from psvideo.synth import Noise, TrueClock, expose
 
@@ -24,7 +24,7 @@ def timed(plan: Plan, stated: Plan, seed: int, noise: Noise) -> tuple[Timing, fl
     plates: dict[int, np.ndarray] = {slot: 0.2 + 0.5 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
     clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
     shot = expose(plates, plan, frames=FRAMES, clock=clock, noise=noise, bits=12, seed=seed)
-    timing = find_timing(stated, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
+    timing = timing_from_rows(stated, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
     true_s = np.array([flash.start_s for flash in shot.flashes])
     off_s = timing.start_s - true_s[np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)]
     return timing, float(np.sqrt(np.mean(off_s**2)))

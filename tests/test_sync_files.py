@@ -14,7 +14,7 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.open_take import open_take
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.camera.dpx_writer import dpx_bytes
@@ -46,7 +46,7 @@ def shoot(
 
 def timing_through(path: Path, plan: Plan) -> Timing:
     (path if path.is_dir() else path.parent).joinpath("plan.toml").write_text(format_plan(plan))
-    return find_take_timing(open_take(path))
+    return find_timing(open_take(path))
 
 
 def rms_rows(timing: Timing, shot: Exposure, plan: Plan) -> float:

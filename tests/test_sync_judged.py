@@ -10,7 +10,7 @@ import pytest
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.normal_equations import solved
 from psvideo.synth import Noise, TrueClock, expose
 
@@ -39,7 +39,7 @@ def filmed(plan: Plan, *, frames: int = FRAMES, phase_s: float = 0.0123, **optio
 
 
 def timing_of(plan: Plan, profiles: np.ndarray) -> Timing:
-    return find_timing(plan, np.arange(len(profiles)), profiles)
+    return timing_from_rows(plan, np.arange(len(profiles)), profiles)
 
 
 def with_camera(plan: Plan, **changes: object) -> Plan:

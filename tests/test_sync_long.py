@@ -10,7 +10,7 @@ import pytest
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit import long_takes
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import first_guess
@@ -43,7 +43,7 @@ def drifting(plan: Plan, noise: Noise) -> Exposure:
 
 
 def timed(plan: Plan, shot: Exposure, profiles: FloatArray) -> Timing:
-    return find_timing(plan, np.arange(FRAMES), profiles)
+    return timing_from_rows(plan, np.arange(FRAMES), profiles)
 
 
 def errors_in_rows(timing: Timing, shot: Exposure, plan: Plan) -> FloatArray:

@@ -11,7 +11,7 @@ from bench.timing_scenes import plan_of, rolling_stripes, tumbling
 from psvideo.errors import NoStrobeError
 from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
@@ -27,7 +27,7 @@ def timed(case: Case, seed: int) -> tuple[Timing, float]:
     """Return a case's timing and the RMS error of its flashes in rows."""
     filmed = case.film(seed)
     index, profiles, doubt = collect_with_doubt(filmed.frames)
-    timing = find_timing(case.claimed or case.plan, index, profiles, doubt=doubt)
+    timing = timing_from_rows(case.claimed or case.plan, index, profiles, doubt=doubt)
     error_s, named = against_truth(timing, filmed, 1.0)
     assert named
     return timing, float(np.sqrt(np.mean(error_s**2))) / case.plan.camera.row_time_s

@@ -11,7 +11,7 @@ from psvideo.errors import NoStrobeError
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.flashes_seen import flashes_seen
 from psvideo.sync.joined import Chapter, joined
 from psvideo.sync.restarted import recut
@@ -82,7 +82,7 @@ def off_s(
 def test_a_strobe_that_begins_anew_is_timed_before_and_after(share: float, plan: Plan) -> None:
     pitch_s = plan.cycle_s / len(plan.cycle_slots)
     shots, profiles = with_restart(plan, share * pitch_s)
-    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     off = off_s(timing, shots, plan.camera.frame_period_s)
     assert off.max() < 0.05 * plan.camera.row_time_s
     assert len(off) > 0.9 * FRAMES * plan.camera.frame_period_s / pitch_s - 4
@@ -99,7 +99,7 @@ def test_a_frame_that_shows_both_strobes_stands_for_no_missing_frames(share: flo
     shots, profiles = with_restart(plan, share * plan.cycle_s / len(plan.cycle_slots), cut=cut)
     profiles = profiles[:72].copy()
     profiles[cut, :split] = shots[0].frames[cut, :split].mean(axis=1)
-    timing = find_timing(plan, np.arange(72), profiles)
+    timing = timing_from_rows(plan, np.arange(72), profiles)
     assert timing.dropped_frames == ()
     assert timing.repeated_frames == ()
     assert off_s(timing, shots, plan.camera.frame_period_s, cut=cut).max() < 0.05 * plan.camera.row_time_s
@@ -113,7 +113,7 @@ def test_without_a_marker_lights_keep_their_names_over_a_restart(make_plan: Plan
     shots, profiles = with_restart(plan, 1.4 * pitch_s)
     first = next(flash for flash in shots[0].flashes if flash.start_s > plan.camera.frame_period_s)
     (light,) = first.lights
-    timing = find_timing(plan, np.arange(FRAMES), profiles, first_light=light)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles, first_light=light)
     assert off_s(timing, shots, plan.camera.frame_period_s).max() < 0.05 * plan.camera.row_time_s
     assert timing.order == "given"
 
@@ -124,7 +124,7 @@ def test_lights_that_look_alike_are_not_named_over_a_restart(make_plan: PlanMake
     shots, profiles = with_restart(plan, 1.34 * pitch_s, alike=True)
     first = next(flash for flash in shots[0].flashes if flash.start_s > plan.camera.frame_period_s)
     (light,) = first.lights
-    timing = find_timing(plan, np.arange(FRAMES), profiles, first_light=light)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles, first_light=light)
     assert any("started again" in note for note in timing.notes)
     assert timing.order == "guess"
 
@@ -171,7 +171,7 @@ def test_what_one_part_of_a_clip_lacks_puts_the_flashes_of_the_next_later(plan: 
 def test_thirty_frames_that_are_missing_are_one_hole(plan: Plan) -> None:
     keep = np.delete(np.arange(160), np.arange(60, 90))
     profiles = shot_of(plan, frames=160).frames.mean(axis=2, dtype=np.float64)[keep]
-    timing = find_timing(plan, np.arange(len(keep)), profiles)
+    timing = timing_from_rows(plan, np.arange(len(keep)), profiles)
     assert timing.dropped_frames == (DroppedFrames(after=59, count=30),)
     assert not any("The strobe started again" in note for note in timing.notes)
     assert sum("as if 30 frames were missing" in note and "may look the same" in note for note in timing.notes) == 1
@@ -180,7 +180,7 @@ def test_thirty_frames_that_are_missing_are_one_hole(plan: Plan) -> None:
 def test_frames_that_are_missing_are_no_restart(plan: Plan) -> None:
     keep = np.delete(np.arange(FRAMES), [31, 62, 63, 64])
     profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)[keep]
-    timing = find_timing(plan, np.arange(len(keep)), profiles)
+    timing = timing_from_rows(plan, np.arange(len(keep)), profiles)
     assert [(hole.after, hole.count) for hole in timing.dropped_frames] == [(30, 1), (60, 3)]
     assert not any("started again" in note for note in timing.notes)
 
@@ -240,7 +240,7 @@ ENDS = {"stops": ("noise", "dark", "moving"), "begins late": ("flicker", "bright
 def test_only_frames_that_the_strobe_lights_have_flashes(kind: str, first: bool, plan: Plan) -> None:
     strobed, count, period_s = shot_of(plan, frames=72), 40, plan.camera.frame_period_s
     profiles, without = strobed.frames.mean(axis=2, dtype=np.float64), other_picture(kind, count)
-    timing = find_timing(
+    timing = timing_from_rows(
         plan, np.arange(72 + count), np.concatenate([without, profiles] if first else [profiles, without])
     )
     true_s = np.array([flash.start_s for flash in strobed.flashes]) + first * count * period_s
@@ -258,7 +258,9 @@ def test_only_frames_that_the_strobe_lights_have_flashes(kind: str, first: bool,
 def test_a_picture_that_freezes_ends_the_strobe(count: int, plan: Plan) -> None:
     strobed = shot_of(plan, frames=72)
     profiles = strobed.frames.mean(axis=2, dtype=np.float64)
-    timing = find_timing(plan, np.arange(72 + count), np.concatenate([profiles, np.tile(profiles[-1], (count, 1))]))
+    timing = timing_from_rows(
+        plan, np.arange(72 + count), np.concatenate([profiles, np.tile(profiles[-1], (count, 1))])
+    )
     assert any(f"No strobe like the plan's is found in frames 71 to {71 + count}" in one for one in timing.notes)
     assert max(flash.start_s for flash in timing.flashes) < 72 * plan.camera.frame_period_s
 
@@ -278,7 +280,7 @@ def test_frames_show_a_strobe_at_any_place_in_its_cycle_or_none(plan: Plan) -> N
 @pytest.mark.parametrize("cut", [40, 88])
 def test_a_clock_that_jumps_by_little_shows_in_the_error_and_is_told(cut: int, plan: Plan) -> None:
     shots, profiles = with_restart(plan, -0.03 * plan.cycle_s / len(plan.cycle_slots), cut=cut)
-    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     row_s = plan.camera.row_time_s
     off = np.abs(off_s(timing, shots, plan.camera.frame_period_s, cut=cut)) / row_s
     assert np.sqrt(np.mean(off**2)) > 0.05
@@ -305,7 +307,7 @@ def test_a_frame_that_is_repeated_early_in_a_noisy_clip_is_no_restart(
         seed=seed,
     )
     profiles = shot.frames.mean(axis=2, dtype=np.float64)
-    timing = find_timing(plan, np.arange(46), np.insert(profiles, again, profiles[again - 1], axis=0))
+    timing = timing_from_rows(plan, np.arange(46), np.insert(profiles, again, profiles[again - 1], axis=0))
     assert timing.repeated_frames == (again,)
     assert not any("started again" in note for note in timing.notes)
 
@@ -320,7 +322,7 @@ def test_parts_between_which_frames_are_missing_are_one_strobe(plan: Plan, monke
     profiles = np.delete(shot.frames.mean(axis=2, dtype=np.float64), BREAK, axis=0)
     parts = parts_of(plan, rows_of(plan, profiles), [slice(0, BREAK - 9), slice(BREAK + 15, FRAMES)])
     monkeypatch.setattr("psvideo.sync.find.found_in_parts", lambda *_: parts)
-    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     assert timing.dropped_frames == (DroppedFrames(after=BREAK - 1, count=1),)
     assert off_s(timing, (shot, shot), plan.camera.frame_period_s).max() < 0.05 * plan.camera.row_time_s
     assert not any("started again" in note for note in timing.notes)
@@ -342,7 +344,7 @@ def test_a_strobe_that_paused_before_a_global_shutter_is_timed_or_refused(make_p
     profiles = profiles[:52].copy()
     profiles[14:25] = 0.02
     try:
-        timing = find_timing(plan, np.arange(len(profiles)), profiles)
+        timing = timing_from_rows(plan, np.arange(len(profiles)), profiles)
     except NoStrobeError:
         return
     assert off_s(timing, shots, plan.camera.frame_period_s, cut=20).max() < 0.1 * plan.shortest_flash_s

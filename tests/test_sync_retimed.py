@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.coarse import seed as seed_module
 from psvideo.sync.rowfit.coarse.retime import regular_step, twins
 from psvideo.sync.rowfit.coarse.seed import find_seed, other_seeds
@@ -63,7 +63,7 @@ def retimed(plan: Plan, shown: NDArray[np.int64], *, ppm: float = 40.0, recoded:
     """Time a clip that shows these moments of a longer one; ``recoded`` is what encoding adds, in rows' deviations."""
     profiles = shot_of(plan, int(shown.max()) + 1, ppm).frames[shown].mean(axis=2, dtype=np.float64)
     noise = np.random.default_rng(1).standard_normal(profiles.shape)
-    return find_timing(plan, np.arange(len(shown)), profiles + recoded * profiles.std() * noise)
+    return timing_from_rows(plan, np.arange(len(shown)), profiles + recoded * profiles.std() * noise)
 
 
 def rms_rows(timing: Timing, plan: Plan, frames: int) -> float:
@@ -139,7 +139,7 @@ def test_an_unknown_clock_and_readout_do_not_hide_a_pattern(make_plan: PlanMaker
     unknown = replace(plan, clock_tolerance_ppm=None, camera=replace(plan.camera, readout_s=None))
     shown = pattern("6/5", 2)
     profiles = shot_of(plan, int(shown.max()) + 1, 6000.0).frames[shown].mean(axis=2, dtype=np.float64)
-    timing = find_timing(unknown, np.arange(len(shown)), profiles)
+    timing = timing_from_rows(unknown, np.arange(len(shown)), profiles)
     assert_placed(timing, shown)
     assert timing.clock_offset_ppm == pytest.approx(6000.0, abs=2.0)
 
@@ -191,13 +191,13 @@ def test_an_end_that_fits_no_place_gives_no_whole_flash(end: str, plan: Plan) ->
     """The frame there belongs to another take."""
     profiles = shot_of(plan, FRAMES).frames.mean(axis=2, dtype=np.float64)
     profiles[0 if end == "first" else -1] = profiles[30:36].mean(axis=0)[::-1]
-    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     assert any(f"The {end} frame" in note for note in timing.notes)
     cut_s = plan.camera.frame_period_s * (1 if end == "first" else FRAMES - 1)
     inside = [flash.start_s > cut_s - 1e-9 if end == "first" else flash.start_s < cut_s for flash in timing.flashes]
     whole = [flash.complete for flash in timing.flashes]
     assert all(good or not one for one, good in zip(whole, inside, strict=True))
-    clean = find_timing(plan, np.arange(FRAMES), shot_of(plan, FRAMES).frames.mean(axis=2, dtype=np.float64))
+    clean = timing_from_rows(plan, np.arange(FRAMES), shot_of(plan, FRAMES).frames.mean(axis=2, dtype=np.float64))
     assert sum(whole) < sum(flash.complete for flash in clean.flashes)
     assert not clean.notes
 
@@ -237,7 +237,7 @@ def test_repeats_survive_h264(plan: Plan, tmp_path: Path) -> None:
     with av.open(str(path)) as movie:
         seen = [frame.to_ndarray(format="gray").mean(axis=1) / 255 for frame in movie.decode(video=0)]
     assert (np.diff(np.array(seen), axis=0)[shown[1:] == shown[:-1]] != 0).any()
-    timing = find_timing(wide, np.arange(len(seen)), np.array(seen, np.float64))
+    timing = timing_from_rows(wide, np.arange(len(seen)), np.array(seen, np.float64))
     assert_placed(timing, shown)
 
 
@@ -281,7 +281,7 @@ def test_doubled_durations_are_refused(plan: Plan) -> None:
     doubled = replace(plan, flashes=tuple(replace(one, duration_s=2 * one.duration_s) for one in plan.flashes))
     profiles = shot_of(plan, FRAMES).frames.mean(axis=2, dtype=np.float64)
     with pytest.raises(PsvideoError, match=r"flashes of 0\.8 ms"):
-        find_timing(doubled, np.arange(FRAMES), profiles)
+        timing_from_rows(doubled, np.arange(FRAMES), profiles)
 
 
 @pytest.mark.campaign
@@ -298,7 +298,7 @@ def test_numberings_are_looked_for_where_nearly_all_frames_of_a_stretch_are_alik
 def test_where_many_frames_are_missing_the_strobe_may_have_started_again(plan: Plan, missing: int) -> None:
     shot = shot_of(plan, FRAMES + missing)
     kept = np.delete(shot.frames.mean(axis=2, dtype=np.float64), slice(31, 31 + missing), axis=0)
-    timing = find_timing(plan, np.arange(FRAMES), kept)
+    timing = timing_from_rows(plan, np.arange(FRAMES), kept)
     assert timing.dropped_frames == (DroppedFrames(after=30, count=missing),)
     notes = [note for note in timing.notes if "started again may look the same" in note]
     assert len(notes) == (missing > 3)

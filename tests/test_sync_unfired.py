@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -36,7 +36,7 @@ def shot_of(plan: Plan, dead: Callable[[TrueFlash], bool], *, fade: float = 1.0)
 
 
 def timing_of(plan: Plan, shot: Exposure) -> Timing:
-    return find_timing(plan, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
+    return timing_from_rows(plan, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
 
 
 def inside(plan: Plan, shot: Exposure) -> list[TrueFlash]:
@@ -105,7 +105,7 @@ def test_a_dead_light_has_no_flash_below_360_degrees_either(share: float, make_p
     from_s = share * FRAMES * period_s
     shot = shot_of(plan, lambda flash: flash.slot == slot and flash.start_s > from_s)
     profiles = shot.frames.mean(axis=2, dtype=np.float64)
-    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     name = next(note.split(":")[0] for note in timing.notes if "never fired" in note)
     dead_s = np.array([one.start_s for one in shot.flashes if one.slot == slot and one.start_s > from_s])
     complete_s = np.array([one.start_s for one in timing.flashes if one.complete])

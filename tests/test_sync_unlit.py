@@ -8,7 +8,7 @@ import pytest
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
 from psvideo.synth import Exposure, Noise, TrueClock, expose
@@ -49,7 +49,7 @@ def laid_out(plan: Plan, profiles: FloatArray) -> Profiles:
 @pytest.mark.parametrize("dark", [slice(0, 40), slice(60, 110), slice(40, 75)])
 def test_frames_without_the_strobe_are_left_out_and_said(dark: slice, plan: Plan) -> None:
     shot = shot_of(plan)
-    timing = find_timing(plan, np.arange(FRAMES), profiles_of(shot, dark))
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles_of(shot, dark))
     true_s = np.array([flash.start_s for flash in shot.flashes])
     off_s = np.abs(true_s[:, None] - timing.start_s).min(axis=0)
     assert off_s.max() < 0.03 * plan.camera.row_time_s
@@ -72,7 +72,7 @@ def test_a_strobe_that_begins_a_little_late_is_timed_also_where_a_frame_is_lost(
     shot = shot_of(plan)
     profiles = profiles_of(shot, slice(0, late))
     profiles[57] = 0.0
-    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     true_s = np.array([flash.start_s for flash in shot.flashes])
     off_s = np.abs(true_s[:, None] - timing.start_s).min(axis=0)
     assert off_s.max() < 0.03 * plan.camera.row_time_s

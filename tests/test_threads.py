@@ -227,7 +227,7 @@ LEFT_IN_C = """
 import time
 import numpy as np
 import cv2
-from psvideo.compute.beside import run_beside
+from psvideo.compute.side_threads import run_beside
 picture = np.zeros((400, 400), np.float32)
 def blur():
     until = time.monotonic() + 0.6

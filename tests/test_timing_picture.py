@@ -12,7 +12,7 @@ from psvideo.formats.screen_pictures import write_png
 from psvideo.model.plan import Plan
 from psvideo.pictures.contact import GAP_PX
 from psvideo.pictures.timing_sheet import COLOURS, DARK, SIDE_PX, timing_picture
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.profiles import residuals_of
 from psvideo.synth import TrueClock, expose
 
@@ -25,7 +25,7 @@ def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
     scene = {slot: (0.2 + 0.5 * rng.random((60, 2))).astype(np.float32) for slot in plan.lit_slots}
     shot = expose(scene, plan, frames=40, clock=TrueClock(phase_s=0.004))
     profiles, places = shot.frames.mean(axis=2, dtype=np.float64), np.arange(40)
-    timing = find_timing(plan, places, profiles)
+    timing = timing_from_rows(plan, places, profiles)
     late = replace(timing, flashes=tuple(replace(flash, start_s=flash.start_s + 4e-4) for flash in timing.flashes))
     assert np.abs(residuals_of(plan, timing, places, profiles)).max() < 1e-3
     assert np.abs(residuals_of(plan, late, places, profiles)).max() > 0.05

@@ -10,7 +10,7 @@ from bench.accuracy_motion import ASLANT, BOX, BUST, UNALIGNED, Filmed, filmed, 
 from psvideo.model.surface import Surface
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 
@@ -91,7 +91,7 @@ def test_a_sheet_in_waves_is_trusted_as_without_alignment_and_its_normals_are_be
         for n, (name, direction) in enumerate(zip(names, DIRECTIONS, strict=True)):
             time_s = (4 * (number - 2) + n - 1) * PITCH_S
             light = 0.9 * spots((128, 160)) * np.maximum(waving(time_s) @ direction, 0)
-            picture = made(np.asarray(light + rng.normal(0, 0.003, light.shape), np.float32))
+            picture = mixture_of(np.asarray(light + rng.normal(0, 0.003, light.shape), np.float32))
             seen = np.ones(len(light), np.bool_)
             plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))
     lit = Illumination(directions=DIRECTIONS, intensities=np.full((3, 1), 0.9), names=names)
@@ -130,7 +130,7 @@ def of_board(how: Aligning) -> tuple[np.ndarray, np.ndarray]:
         for n, (name, direction) in enumerate(zip(names, FIVE, strict=True)):
             time_s = (6 * (number - 2) + n - 2) * PITCH_S
             light = 0.9 * albedo * np.maximum(turning(time_s) @ direction, 0)
-            picture = made(np.asarray(light + rng.normal(0, NOISE, light.shape), np.float32))
+            picture = mixture_of(np.asarray(light + rng.normal(0, NOISE, light.shape), np.float32))
             seen = np.ones(len(light), np.bool_)
             plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))
     lit = Illumination(directions=FIVE, intensities=np.full((5, 1), 0.9), names=names)

@@ -19,7 +19,7 @@ from psvideo.model.surface import Misfit, Surface
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.judge import of_motion, of_rows, of_timing, result
 from psvideo.report.judge.every_line import judgements
@@ -168,14 +168,16 @@ class Footage:
         seen = np.arange(SIZE) >= self.unseen * SIZE
         shown_s = np.where(np.arange(SIZE) < self.borrowed * SIZE, n - 1.0, float(n)) if self.borrowed else None
         taken = tuple(
-            LightPlate(light=name, number=1001 + n, time_s=float(n), picture=made(plate), seen=seen, shown_s=shown_s)
+            LightPlate(
+                light=name, number=1001 + n, time_s=float(n), picture=mixture_of(plate), seen=seen, shown_s=shown_s
+            )
             for name, plate in zip(names, plates, strict=True)
         )
         dark = None
         if self.ambient and self.measured is None:
             level = np.full((SIZE, SIZE), self._dark_level(clean, n), np.float32)
             whole = np.ones(SIZE, np.bool_)
-            dark = LightPlate(light=AMBIENT, number=1001 + n, time_s=float(n), picture=made(level), seen=whole)
+            dark = LightPlate(light=AMBIENT, number=1001 + n, time_s=float(n), picture=mixture_of(level), seen=whole)
         return Round(number=1001 + n, plates=taken, ambient=dark)
 
 
@@ -836,7 +838,7 @@ def test_what_is_clipped_does_not_seem_to_move_where_the_rows_that_two_frames_sh
         shared = (np.arange(SIZE) - 24 * number) % SIZE < 24
         clipped = np.where(shared[:, None], light, np.minimum(light, 1)).astype(np.float32)
         return LightPlate(
-            light="a", number=number, time_s=float(number), picture=made(clipped), seen=np.ones(SIZE, np.bool_)
+            light="a", number=number, time_s=float(number), picture=mixture_of(clipped), seen=np.ones(SIZE, np.bool_)
         )
 
     one = glimpse(plate(0))

@@ -36,7 +36,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.solve.images import solve_images as solve_images
     from psvideo.solve.of_take import solve as solve
     from psvideo.sync.open_take import open_take as open_take
-    from psvideo.sync.take_timing import find_take_timing as find_timing
+    from psvideo.sync.take_timing import find_timing as find_timing
     from psvideo.synth.shoot import shoot as shoot
 
 _HOMES = {
@@ -48,7 +48,7 @@ _HOMES = {
     "Timing": "psvideo.model.timing",
     "check": "psvideo.runs.check",
     "find_depth": "psvideo.solve.depth.shaping",
-    "find_timing": "psvideo.sync.take_timing:find_take_timing",
+    "find_timing": "psvideo.sync.take_timing:find_timing",
     "gather": "psvideo.plates.gather",
     "normals": "psvideo.runs.normals",
     "normals_of_takes": "psvideo.runs.many_takes.normals_of_takes",

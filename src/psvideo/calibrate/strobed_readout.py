@@ -15,7 +15,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""
@@ -88,5 +88,5 @@ def measure_take_readout(take: Take, *, tolerance_ppm: float | None = None, watc
     Raises PsvideoError where no strobe is found.
     """
     unknown = replace(take.plan, camera=replace(take.plan.camera, readout_s=None))
-    timing = find_take_timing(replace(take, clip=replace(take.clip, plan=unknown)), watch=watch)
+    timing = find_timing(replace(take, clip=replace(take.clip, plan=unknown)), watch=watch)
     return readout_of(unknown, timing, frames=len(take.numbers), tolerance_ppm=tolerance_ppm)

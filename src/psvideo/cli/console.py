@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     import typer
 
-    from psvideo.report.of_takes import TakeResult
     from psvideo.report.run_report import RunReport
+    from psvideo.report.takes_report import TakeResult
     from psvideo.runs.steps.caller import Caller
 
 from psvideo.cli.options.clip_and_run import Json, Quiet, Verbose
@@ -142,7 +142,7 @@ def print_takes(voice: Voice, results: "Sequence[TakeResult]") -> None:
     """Say what became of several takes, the worst first, and end with a fault where one could not be used."""
     import typer
 
-    from psvideo.report.of_takes import takes_record
+    from psvideo.report.takes_report import takes_record
 
     voice.result(takes_record(results))
     for one in results:

@@ -10,7 +10,7 @@ from psvideo.calibrate.mirror.lights import calibrate_lights
 from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
-from psvideo.compute.beside import run_beside
+from psvideo.compute.side_threads import run_beside
 from psvideo.errors import PsvideoError
 from psvideo.live.chain import NewestRound
 from psvideo.live.showing.smaller import smaller_rig

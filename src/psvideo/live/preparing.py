@@ -3,8 +3,8 @@ and Ctrl-C ends it at once."""
 
 from collections.abc import Callable
 
-from psvideo.compute.beside import run_beside
 from psvideo.compute.compile_count import CompileCount
+from psvideo.compute.side_threads import run_beside
 from psvideo.model.units import counted
 
 USUAL_S = 60

@@ -9,9 +9,9 @@ from math import inf
 
 import numpy as np
 
-from psvideo.compute.beside import run_beside
 from psvideo.compute.compile_count import CompileCount, compiles_counted
 from psvideo.compute.heap import no_looks_at_what_is_loaded
+from psvideo.compute.side_threads import run_beside
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.following.holding import Holding
 from psvideo.live.incoming.behind import Behind

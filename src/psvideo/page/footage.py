@@ -9,9 +9,9 @@ import numpy as np
 
 from psvideo.clip import Clip, demosaic, open_clip, read_frames
 from psvideo.model.choices import SplitMethod
-from psvideo.page.compared import ComparedPlates
 from psvideo.page.picture import Look, PagePicture, shown
 from psvideo.page.show import Show, ShownSequence
+from psvideo.page.split_comparison import ComparedPlates
 
 METHODS: tuple[tuple[SplitMethod, str], ...] = (
     ("weights", "Plates by the rows' weights"),

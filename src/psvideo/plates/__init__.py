@@ -2,7 +2,7 @@
 
 ``gather`` does it for a whole clip: begin there. On its way:
 
-- times and names: ``timed`` (when flashes fired), ``naming`` (which light is which)
+- times and names: ``named_timing`` (when flashes fired), ``naming`` (which light is which)
 - plates of flashes: ``split``; ``nearest_rows`` fills rows that a flash missed from the nearest round that saw them
 - rounds: ``light_plate`` and ``sequence`` collect them, ``upright`` turns them
 

@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.errors import UsageError, nearest
 from psvideo.model.plan import Plan
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round
 
 BEAUTY = "beauty"
@@ -69,4 +69,4 @@ def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightP
     seen = np.all(known, axis=0) if used else np.ones(image.shape[0], np.bool_)
     for plate, _ in used:
         image[~plate.rows_seen] = 0
-    return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, picture=made(image), seen=seen)
+    return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, picture=mixture_of(image), seen=seen)

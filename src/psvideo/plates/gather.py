@@ -18,14 +18,14 @@ from psvideo.model.choices import SplitMethod
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
-from psvideo.plates.align.opened import with_open_shutter
+from psvideo.plates.align.open_shutter import with_open_shutter
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient.ambient_followed import update
 from psvideo.plates.ambient.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, at_true_places, dark_plates, ripple_of, used_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made, shown_level
+from psvideo.plates.mixing.mixture import mixture_of, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
@@ -233,7 +233,7 @@ def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:
     if clip.cfa is None:
         return lambda plate: plate
     pattern = clip.cfa
-    return lambda plate: replace(plate, picture=made(demosaic(plate.image, pattern)))
+    return lambda plate: replace(plate, picture=mixture_of(demosaic(plate.image, pattern)))
 
 
 def _shown(plates: Iterable[AnyPlate], show: Callable[[AnyPlate], None] | None) -> Iterator[AnyPlate]:

@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.coded import Image, LinearFrame
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate
 
 REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -42,7 +42,7 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
             done = flash.index
             middles_s = current.index * camera.frame_period_s + camera.row_offsets_s() + camera.exposure_s / 2
             shares, seen = np.ones((1, rows)), np.ones(rows, np.bool_)
-            yield Plate(flash=flash, picture=made(image), shares=shares, middles_s=middles_s[None], seen=seen)
+            yield Plate(flash=flash, picture=mixture_of(image), shares=shares, middles_s=middles_s[None], seen=seen)
 
 
 def luminance_energy(image: Image) -> FloatArray:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 
 LATER, MOST_LATER = 2, 8
 """A plate waits for later ones of its light: for two where earlier ones showed what it lacks, for eight at a clip's
@@ -66,7 +66,7 @@ class _Waiting:
         if plate.rows_seen.all():
             return cls(plate=plate, rows=None, shape=plate.shape)
         rows = plate.picture.rows(np.flatnonzero(plate.rows_seen))
-        return cls(plate=replace(plate, picture=made(rows[:0])), rows=rows, shape=plate.shape)
+        return cls(plate=replace(plate, picture=mixture_of(rows[:0])), rows=rows, shape=plate.shape)
 
     def given(self) -> LightPlate:
         """Return the plate with its own rows, the others 0."""
@@ -74,7 +74,7 @@ class _Waiting:
             return self.plate
         image = np.zeros(self.shape, np.float32)
         image[self.plate.rows_seen] = self.rows
-        return replace(self.plate, picture=made(image))
+        return replace(self.plate, picture=mixture_of(image))
 
     def put(self, image: NDArray[np.float32], wanted: Flags) -> None:
         """Write those of its rows that are wanted."""
@@ -118,7 +118,7 @@ def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPl
         wanted = one.plate.rows_seen & ~own.rows_seen & nearer
         one.put(image, wanted)
         shown_s[wanted], seen[wanted] = one.plate.time_s, True
-    return replace(own, picture=made(image), seen=seen, shown_s=shown_s)
+    return replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s)
 
 
 def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
@@ -128,4 +128,4 @@ def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
     image = np.array(plate.image)
     image[rows] = other.image[rows]
     shown_s: FloatArray = np.where(rows, other.flashed_s, plate.flashed_s)
-    return replace(plate, picture=made(image), seen=plate.rows_seen | rows, shown_s=shown_s)
+    return replace(plate, picture=mixture_of(image), seen=plate.rows_seen | rows, shown_s=shown_s)

@@ -12,14 +12,14 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.turn import Turn
 from psvideo.plates.align.packed import packed
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 
 
 def upright(plate: LightPlate, turn: Turn) -> LightPlate:
     """Return a plate as it is to be seen, with what is known of its rows."""
     if turn.is_none:
         return plate
-    picture = packed(made(turn.upright(plate.image)), plate.saturation)
+    picture = packed(mixture_of(turn.upright(plate.image)), plate.saturation)
     return replace(plate, picture=picture, seen=_seen(plate, turn), shown_s=_shown_s(plate, turn))
 
 

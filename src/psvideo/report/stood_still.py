@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.report.of_rigs import LightOfTake, RigResult
+from psvideo.report.rigs_report import LightOfTake, RigResult
 
 SURE = 3.0
 """Standard errors of the difference beyond which a light is said to have changed. An error of a direction is the root

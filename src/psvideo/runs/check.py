@@ -36,7 +36,7 @@ from psvideo.runs.steps.saturation import saturation_of
 from psvideo.solve.instants import surfaces
 from psvideo.solve.normals.solving import Solving
 from psvideo.sync.open_take import open_take
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4
@@ -159,14 +159,14 @@ def _timed(take: Take, first_light: str | None, watch: Watch) -> tuple[Take, Tim
     """Return when a take's flashes fired, and the take with the frames that showed it: as many again, up to a bound,
     where the first ones are too few, as beside frames that are missing. Raises NoStrobeError where neither show it."""
     try:
-        return take, find_take_timing(take, first_light=first_light, watch=watch)
+        return take, find_timing(take, first_light=first_light, watch=watch)
     except NoStrobeError:
         more = take.clip.numbers[: min(WIDER * len(take.numbers), MOST_FRAMES)]
         if len(more) <= len(take.numbers):
             raise
         wider = replace(take, numbers=tuple(more))
         with suppress(NoStrobeError):
-            return wider, find_take_timing(wider, first_light=first_light, watch=watch)
+            return wider, find_timing(wider, first_light=first_light, watch=watch)
         raise
 
 

@@ -18,7 +18,7 @@ from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.on_screen import exposure_for, srgb
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import relight
-from psvideo.plates.timed import read_or_find_timing
+from psvideo.plates.named_timing import read_or_find_timing
 from psvideo.runs.instants.job import Job
 from psvideo.runs.instants.results import normals_run
 from psvideo.runs.steps.lighting import read_lighting

@@ -33,8 +33,8 @@ from psvideo.model.choices import (
 )
 from psvideo.model.quantities import Aov
 from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.named_timing import read_or_find_timing
 from psvideo.plates.sequence import FIRST_NUMBER
-from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.beforehand import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime

@@ -14,8 +14,8 @@ from psvideo.model.choices import USUAL_COMPRESSION, Compression, MovieCodec, Pl
 from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
+from psvideo.plates.named_timing import read_or_find_timing
 from psvideo.plates.sequence import FIRST_NUMBER
-from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.instants.job import OverTime
 from psvideo.runs.instants.plates import Extras, split_run

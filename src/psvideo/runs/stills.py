@@ -17,7 +17,7 @@ from psvideo.formats.paths import path_if_given, path_of
 from psvideo.model.choices import MapFiles, MeshKind, Program, Solver
 from psvideo.model.quantities import Aov
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.timed import read_or_find_timing
+from psvideo.plates.named_timing import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import looking_for, radius_in_m
 from psvideo.runs.delivery.beforehand import metric_delivery

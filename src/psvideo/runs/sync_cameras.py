@@ -13,7 +13,7 @@ from psvideo.model.units import counted
 from psvideo.runs.steps.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.open_take import open_take
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 
 def sync_cameras(
@@ -74,7 +74,7 @@ def sync_cameras(
     for clip in clips:
         take = open_take(path_of("clips", clip))
         say_of_clip(take.clip, caller)
-        timing = find_take_timing(take, watch=watch)
+        timing = find_timing(take, watch=watch)
         for note in timing.notes:
             caller.warn(f"{take.clip.name}: {note}")
         takes.append(CameraTake(plan=take.plan, timing=timing))

@@ -12,7 +12,14 @@ from psvideo.model.choices import NEAR_ITERATIONS, Solver
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
-from psvideo.solve.given import check_count, check_lit, checked_images, checked_lights, checked_mask, checked_saturation
+from psvideo.solve.array_checks import (
+    check_count,
+    check_lit,
+    checked_images,
+    checked_lights,
+    checked_mask,
+    checked_saturation,
+)
 from psvideo.solve.near_surface import near_surface_of, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving

@@ -29,7 +29,7 @@ from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Samples
-from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
+from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of
 from psvideo.solve.steady import SHOWN, Steady, steadied
 from psvideo.solve.sweeping import swept
 

@@ -20,7 +20,7 @@ from psvideo.plates.spread import rounds_spread
 from psvideo.solve.instants import Instant, subject_of, surfaces
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 
 def solve(
@@ -81,7 +81,7 @@ def solve(
     """
     check_take(take)
     check_rig(rig)
-    found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
+    found = named_by_rig(take, timing or find_timing(take, watch=watch), rig)
     if (unmixing := unmixing_of(take.plan, rig, channels=take.clip.channels)) is not None:
         take, rig = take.unmixed(unmixing), unmixing.rig
     plan, clip = take.plan, take.clip

@@ -44,7 +44,7 @@ ADVICE = (
 )
 
 
-def find_timing(
+def timing_from_rows(
     plan: Plan,
     indices: NDArray[np.int64],
     profiles: FloatArray,
@@ -188,7 +188,7 @@ def find_strobe(
     doubt: NDArray[np.floating] | None = None,
     most_rows: int | None = None,
 ) -> FoundStrobe:
-    """Return the strobe's clock against the camera's, from row profiles as ``find_timing`` takes them.
+    """Return the strobe's clock against the camera's, from row profiles as ``timing_from_rows`` takes them.
 
     Neighbouring rows are averaged to ``most_rows`` where there are more: less time, and a little less sure. Raises
     NoStrobeError where the profiles do not look like the plan's strobe.

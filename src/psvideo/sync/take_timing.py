@@ -11,7 +11,7 @@ from psvideo.compute.threads import thread_count
 from psvideo.model.camera import FloatArray
 from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
-from psvideo.sync.find import find_timing
+from psvideo.sync.find import timing_from_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ def take_profiles(take: Take, *, watch: Watch = unwatched) -> TakeProfiles:
 
 def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str | None = None) -> Timing:
     """Return when every flash fired. Raises PsvideoError where no strobe is found."""
-    return find_timing(
+    return timing_from_rows(
         take.plan,
         profiles.index,
         profiles.value,
@@ -53,7 +53,7 @@ def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str |
     )
 
 
-def find_take_timing(take: Take, *, first_light: str | None = None, watch: Watch = unwatched) -> Timing:
+def find_timing(take: Take, *, first_light: str | None = None, watch: Watch = unwatched) -> Timing:
     """Find when every flash fired, from the picture alone; the take is decoded once.
 
     Parameters

@@ -12,14 +12,14 @@ from psvideo.model.choices import Program
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth
-from psvideo.solve.passes.made import Passes
+from psvideo.solve.passes.asked_passes import Passes
 
 Image = NDArray[np.floating]
 Planes = dict[str, Image]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Made:
+class InstantPictures:
     """What an instant's files are written from; ``beauty``, ``depth``, ``age_s`` and what ``passes`` hold are None
     where nothing asks for them. ``age_s``, of rows or of pixels, is how far in time from the instant what a row shows
     was lit. ``motion`` makes, (row, col, 4), in pixels, x right and y up, where every pixel is one delivered frame
@@ -58,39 +58,43 @@ def ones_of(mask: NDArray[np.bool_]) -> NDArray[np.float16]:
     return (np.ascontiguousarray(mask).view(np.uint8) * one).view(np.float16)
 
 
-PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
-    "normals": lambda made: placed(made.surface.normals, made.space),
-    "albedo": lambda made: made.surface.albedo,
-    "valid": lambda made: ones_of(made.surface.valid),
-    "residual": lambda made: made.surface.residual,
-    "error": lambda made: made.surface.error_deg,
-    "source": lambda made: None if made.surface.source is None else made.surface.source.astype(np.float32),
-    "beauty": lambda made: made.beauty,
-    "depth": lambda made: None if made.depth is None else made.depth.depth,
-    "position": lambda made: made.position,
-    "age": lambda made: made.age,
-    "reach": lambda made: None if made.passes.reach is None else made.passes.reach.astype(np.float32),
-    "specular": lambda made: made.passes.specular,
-    "alpha": lambda made: made.passes.alpha,
-    "motion": lambda made: None if made.motion is None else made.motion(),
+def _as_floats(image: NDArray[np.uint8] | None) -> Image | None:
+    return None if image is None else image.astype(np.float32)
+
+
+PICTURES: Mapping[str, Callable[[InstantPictures], Image | None]] = {
+    "normals": lambda pictures: placed(pictures.surface.normals, pictures.space),
+    "albedo": lambda pictures: pictures.surface.albedo,
+    "valid": lambda pictures: ones_of(pictures.surface.valid),
+    "residual": lambda pictures: pictures.surface.residual,
+    "error": lambda pictures: pictures.surface.error_deg,
+    "source": lambda pictures: _as_floats(pictures.surface.source),
+    "beauty": lambda pictures: pictures.beauty,
+    "depth": lambda pictures: None if pictures.depth is None else pictures.depth.depth,
+    "position": lambda pictures: pictures.position,
+    "age": lambda pictures: pictures.age,
+    "reach": lambda pictures: _as_floats(pictures.passes.reach),
+    "specular": lambda pictures: pictures.passes.specular,
+    "alpha": lambda pictures: pictures.passes.alpha,
+    "motion": lambda pictures: None if pictures.motion is None else pictures.motion(),
 }
 """What computes the picture of each quantity that belongs to an instant; None where it was not made."""
 
 
 BLENDER_VECTOR = (("X", 2, 1.0), ("Y", 3, 1.0), ("Z", 0, -1.0), ("W", 1, -1.0))
-"""Of Blender's vector pass: channel, place in ``Made.motion``, sign. X and Y lead from here to where it was, Z and W
-from where it will be to here (Cycles, primitive_motion_vector)."""
+"""Of Blender's vector pass: channel, place in ``InstantPictures.motion``, sign. X and Y lead from here to where it was,
+Z and W from where it will be to here (Cycles, primitive_motion_vector)."""
 
 
-def planes_of(name: str, made: Made) -> Planes:
+def planes_of(name: str, pictures: InstantPictures) -> Planes:
     """Return a quantity's channels, each (row, col), by their names in a file; grey fills three channels alike.
 
     Raises ValueError where the picture was not made.
     """
-    image = PICTURES[name](made)
+    image = PICTURES[name](pictures)
     if image is None:
         raise ValueError(f"{name} is to be written and was not made")
-    if name == "motion" and made.program == "blender":
+    if name == "motion" and pictures.program == "blender":
         return {f"psvideo.Vector.{name}": _signed(image[..., place], sign) for name, place, sign in BLENDER_VECTOR}
     channels = QUANTITIES[name].channels
     return {channel: image[..., place] if image.ndim == 3 else image for place, channel in enumerate(channels)}
@@ -100,9 +104,9 @@ def _signed(plane: Image, sign: float) -> Image:
     return plane if sign > 0 else -plane
 
 
-def bundled(name: str, made: Made) -> Planes:
+def bundled(name: str, pictures: InstantPictures) -> Planes:
     """Return a quantity's channels in a multipart file: beauty has A too, the matte where it was made, else valid."""
-    planes = planes_of(name, made)
+    planes = planes_of(name, pictures)
     if name == "beauty":
-        planes["A"] = ones_of(made.surface.valid) if made.passes.alpha is None else made.passes.alpha
+        planes["A"] = ones_of(pictures.surface.valid) if pictures.passes.alpha is None else pictures.passes.alpha
     return planes

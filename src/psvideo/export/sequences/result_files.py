@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.export.mesh_files import mesh_name, write_part, write_ply
-from psvideo.export.sequences.planes import Made, bundled, planes_of
+from psvideo.export.sequences.planes import InstantPictures, bundled, planes_of
 from psvideo.export.sequences.png_maps import PNG_MAX, encode_normals, write_png16
 from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
@@ -18,7 +18,7 @@ from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_
 from psvideo.model.surface import Surface
 from psvideo.plates.beauty import Mix
 from psvideo.solve.depth import Depth, mesh_of
-from psvideo.solve.passes.made import Passes
+from psvideo.solve.passes.asked_passes import Passes
 
 MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
 
@@ -117,7 +117,7 @@ def write_surface(
     shape = _integrated(depth) if delivery.needs_depth else None
     if shape is not None:
         _write_meshes(folder, clip, number, surface, shape, delivery)
-    made = Made(
+    pictures = InstantPictures(
         surface=surface,
         space=delivery.space,
         beauty=beauty,
@@ -127,7 +127,7 @@ def write_surface(
         motion=motion,
         program=delivery.program,
     )
-    _write_pictures(folder, clip, number, time_s, made, delivery=delivery, tags=tags)
+    _write_pictures(folder, clip, number, time_s, pictures, delivery=delivery, tags=tags)
 
 
 def _integrated(depth: Callable[[], Depth] | None) -> Depth:
@@ -137,7 +137,7 @@ def _integrated(depth: Callable[[], Depth] | None) -> Depth:
 
 
 def _write_pictures(
-    folder: Path, clip: str, number: int, time_s: float, made: Made, *, delivery: Delivery, tags: Tags
+    folder: Path, clip: str, number: int, time_s: float, pictures: InstantPictures, *, delivery: Delivery, tags: Tags
 ) -> None:
     """Write an instant's picture of each sequence, and the bundle and maps that were asked for beside them."""
     halves = {name: is_half(name, asked=delivery.half) for name in delivery.quantities}
@@ -146,7 +146,7 @@ def _write_pictures(
     for name in delivery.quantities:  # one after the other: what is made for one file is gone before the next
         write_exr(
             folder / result_name(clip, name, number),
-            planes_of(name, made),
+            planes_of(name, pictures),
             half=halves[name],
             attributes=attributes[name],
             fps=tags.fps,
@@ -156,7 +156,7 @@ def _write_pictures(
     if delivery.multipart:
         write_exr_parts(
             folder / bundle_name(clip, number),
-            {name: bundled(name, made) for name in delivery.bundle},
+            {name: bundled(name, pictures) for name in delivery.bundle},
             half=halves,
             attributes=attributes,
             fps=tags.fps,
@@ -164,15 +164,15 @@ def _write_pictures(
             compression=delivery.compression,
         )
     if delivery.png16:
-        _write_maps(folder, clip, number, made, {key: str(value) for key, value in attributes["normals"].items()})
+        _write_maps(folder, clip, number, pictures, {key: str(value) for key, value in attributes["normals"].items()})
 
 
-def _write_maps(folder: Path, clip: str, number: int, made: Made, texts: Mapping[str, str]) -> None:
+def _write_maps(folder: Path, clip: str, number: int, pictures: InstantPictures, texts: Mapping[str, str]) -> None:
     """Write normals and validity as 16-bit PNG files, with what EXR files say in their headers as texts."""
-    planes = planes_of("normals", made)
+    planes = planes_of("normals", pictures)
     normals = encode_normals(np.stack([planes[channel] for channel in "RGB"], axis=-1))
     write_png16(folder / result_name(clip, "normals", number, suffix="png"), normals, texts=texts)
-    mask = np.where(made.surface.valid, np.uint16(PNG_MAX), np.uint16(0))
+    mask = np.where(pictures.surface.valid, np.uint16(PNG_MAX), np.uint16(0))
     write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask, texts=texts)
 
 

@@ -1,15 +1,15 @@
 """Plates of one round show different instants; here they are brought to one.
 
 ``rounds`` does it, plate by plate while a clip is read: begin there. ``comb`` lists the instants that are wanted.
-``held`` keeps sketches and plates (``packed`` into 16 bits, by ``pack_kernel``) for as long as an instant may need
-them. ``between`` makes a light's plate at an instant from the two plates around it (its loop is in ``blend_kernel``);
-``taken`` decides which of the two each pixel comes from, and ``as_they_are`` (loop in ``as_they_are_kernel``) where
-nothing is to be moved, since only plates as they are show one surface.
+``light_history`` keeps sketches and plates (``packed`` into 16 bits, by ``pack_kernel``) for as long as an instant may
+need them. ``between`` makes a light's plate at an instant from the two plates around it (its loop:
+``blend_kernel``); ``pixel_sources`` decides which of the two each pixel comes from, and ``as_they_are`` (loop in
+``as_they_are_kernel``) where nothing is to be moved, since only plates as they are show one surface.
 
 Rooms, from the bottom up:
 
 - ``velocity``: where things move, found from all lights together
 - ``doubt``: by how much a plate may be off because the two that it comes from do not match
 
-What aligned plates are used for: ``opened`` (motion blur), ``denoise`` (means over time).
+What aligned plates are used for: ``open_shutter`` (motion blur), ``denoise`` (means over time).
 """

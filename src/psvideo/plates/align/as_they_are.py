@@ -16,7 +16,7 @@ from psvideo.model.rig import Light, directions
 from psvideo.plates.align.as_they_are_kernel import SOLVED, leave_rows
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
-from psvideo.plates.align.taken import Taken
+from psvideo.plates.align.pixel_sources import Taken
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, SCALE, light_of
 from psvideo.plates.align.velocity.flow import TOE, Flags, comparable
 from psvideo.plates.align.velocity.followed import Followed, Pair

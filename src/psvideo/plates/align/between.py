@@ -21,7 +21,7 @@ from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import Reader, made
+from psvideo.plates.mixing.mixture import Reader, mixture_of
 
 HALF = np.float32(0.5)
 BAND_ROWS = 64
@@ -86,7 +86,7 @@ def plate_at(
         light=own.light,
         number=number,
         time_s=motion.time_s,
-        picture=packed(made(image), own.saturation, put_by, span=span),
+        picture=packed(mixture_of(image), own.saturation, put_by, span=span),
         seen=seen,
         saturation=own.saturation,
         shown_s=own.flashed_s,

@@ -23,9 +23,9 @@ from psvideo.plates.align.between import Ends, plate_at
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.doubt.unsure import UNKNOWN
-from psvideo.plates.align.held import Around, DueInstant, Held
+from psvideo.plates.align.light_history import Around, DueInstant, Held
 from psvideo.plates.align.packed import PutBy
-from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
+from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed, Pair

@@ -14,7 +14,7 @@ from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates.ambient.ambient_followed import Ambient, update
 from psvideo.plates.ambient.ambient_regression import Design, Separated, design_of, separated, windows_of
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate, plate_of
 
 AHEAD = 2
@@ -96,7 +96,7 @@ def _as_dark_slot(found: Separated, design: Design, camera: Camera, last: int) -
     middle_s = (begin_s + end_s) / 2
     return Plate(
         flash=Flash(index=last, slot=0, lights={}, start_s=middle_s, duration_s=0.0, complete=True),
-        picture=made(found.image),
+        picture=mixture_of(found.image),
         shares=np.ones((1, camera.height_px)),
         middles_s=np.full((1, camera.height_px), middle_s),
         seen=found.known,

@@ -190,7 +190,7 @@ def _copying(image: Image) -> Reader:
     return read
 
 
-def made(image: Image) -> Mixture:
+def mixture_of(image: Image) -> Mixture:
     """Return a picture that lies in memory already."""
     coded = Coded(codes=np.ascontiguousarray(image, np.float32))
     return Mixture(frames=(coded,), coefficients=np.ones((1, len(image))), clips_from=np.inf)

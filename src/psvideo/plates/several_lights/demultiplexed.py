@@ -13,7 +13,7 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.mixing.several_pictures import combined
 from psvideo.plates.split import Plate
 
@@ -82,7 +82,7 @@ def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) 
         least = np.float32(1 / exposures.min())
         merged = np.where(exposure_sum > 0, light_sum / np.maximum(exposure_sum, 1e-6), least).astype(np.float32)
         merged[~seen] = 0
-        picture = made(merged)
+        picture = mixture_of(merged)
     time_s = _time_s(parts, exposures)
     return LightPlate(
         light=light, number=number, time_s=time_s, picture=picture, seen=seen, saturation=float(1 / exposures.min())

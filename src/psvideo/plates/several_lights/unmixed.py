@@ -19,7 +19,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixing_kernel import COUNTS
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.plates.several_lights.surface_colour import colours_of, contradicted
 from psvideo.plates.split import Plate
@@ -189,7 +189,7 @@ class _Flashes:
 
     def _like(self, place: int, light: str, image: Image, seen: Flags, most: float) -> LightPlate:
         own = self.one.plates[place]
-        return replace(own, light=light, time_s=self.one.time_s, picture=made(image), seen=seen, saturation=most)
+        return replace(own, light=light, time_s=self.one.time_s, picture=mixture_of(image), seen=seen, saturation=most)
 
 
 def _within(plate: LightPlate, other: LightPlate, where: Flags) -> LightPlate:
@@ -200,7 +200,7 @@ def _within(plate: LightPlate, other: LightPlate, where: Flags) -> LightPlate:
     image[where] = shown[where]
     return replace(
         plate,
-        picture=made(np.asarray(image, np.float32)),
+        picture=mixture_of(np.asarray(image, np.float32)),
         seen=np.where(where, other.pixels_seen, plate.pixels_seen),
         saturation=most,
     )

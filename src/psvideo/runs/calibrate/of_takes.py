@@ -16,7 +16,7 @@ from psvideo.formats.paths import path_of
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 from psvideo.model.rig import Rig
-from psvideo.report.of_rigs import LightOfTake, RigResult, rigs_page, rigs_record, worst_rigs_first
+from psvideo.report.rigs_report import LightOfTake, RigResult, rigs_page, rigs_record, worst_rigs_first
 from psvideo.report.stood_still import changes
 from psvideo.runs.calibrate.colours import colours
 from psvideo.runs.calibrate.flat_field import flat_field

@@ -23,7 +23,7 @@ from psvideo.runs.steps.caller import Caller
 from psvideo.runs.steps.lighting import Lighting
 from psvideo.runs.steps.output import Output
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
-from psvideo.solve.passes.made import FEWEST_FOR_SPECULAR, AskedPasses
+from psvideo.solve.passes.asked_passes import FEWEST_FOR_SPECULAR, AskedPasses
 
 LENS_TOLERANCE = 0.01
 """Share by which two focal lengths may differ before a warning: calibrations of one lens differ by less."""

@@ -24,7 +24,7 @@ from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.runs.delivery.relit import keep_relit
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
-from psvideo.solve.passes.made import AskedPasses, Passes
+from psvideo.solve.passes.asked_passes import AskedPasses, Passes
 
 
 def plates_of(one: Round) -> Iterator[LightPlate]:

@@ -26,7 +26,7 @@ from psvideo.runs.steps.lighting import Lighting
 from psvideo.runs.steps.output import tags_of
 from psvideo.solve.depth import Shaping
 from psvideo.solve.normals.solving import Solving
-from psvideo.solve.passes.made import AskedPasses
+from psvideo.solve.passes.asked_passes import AskedPasses
 
 Pixels = NDArray[np.uint8]
 

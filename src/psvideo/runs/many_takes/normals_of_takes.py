@@ -9,7 +9,7 @@ from typing import Any
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given
-from psvideo.report.of_takes import TakeResult
+from psvideo.report.takes_report import TakeResult
 from psvideo.runs.many_takes.cluster import Cluster
 from psvideo.runs.many_takes.several_takes import Given, Takes, all_done, whole_options
 from psvideo.runs.normals import normals

@@ -14,7 +14,7 @@ from psvideo.formats.paths import path_of, take_name
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import forget_begun, refuse_folder
-from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
+from psvideo.report.takes_report import TakeResult, takes_page, takes_record, worst_first
 from psvideo.runs.many_takes.cluster import Cluster, connected
 from psvideo.runs.many_takes.handed_out import Shared, done_apart
 from psvideo.runs.steps.caller import Caller

@@ -32,7 +32,7 @@ from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.sync.open_take import open_take
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 MOST_SETS = 12
 """Rounds that are read where the user names no frames: more would hardly make a calibration better."""
@@ -210,7 +210,7 @@ def _encoding(files: LightFiles, planned: Encoding | None, transfer: str | None)
 
 
 def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
-    timing = find_take_timing(take, first_light=reading.first_light, watch=watch)
+    timing = find_timing(take, first_light=reading.first_light, watch=watch)
     plan = take.plan
     whole = gather(take, timing, aligning=UNMOVED, watch=watch)
     sets = map(pictures_of_round, islice(whole, None if reading.frames else reading.most))

@@ -122,7 +122,7 @@ def filmed(take: SmallTake, folder: Path) -> Path:
 def _halve_one(clip: Path) -> None:
     """Halve a plate, as runs do with large pictures before they look for motion."""
     from psvideo.plates.gather import gather
-    from psvideo.plates.timed import read_or_find_timing
+    from psvideo.plates.named_timing import read_or_find_timing
     from psvideo.sync.open_take import open_take
 
     take = open_take(clip)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.plates.mixing.mixture import Mixture, Reader, made
+from psvideo.plates.mixing.mixture import Mixture, Reader, mixture_of
 from psvideo.solve.normals.task import Mask, Samples
 
 Floats = NDArray[np.float32]
@@ -25,7 +25,7 @@ class PlateRows:
     @classmethod
     def of(cls, plates: Sequence[Samples] | Sequence[Mixture], seen: Mask | None) -> "PlateRows":
         """Hold plates; nothing is made yet."""
-        mixtures = [plate if isinstance(plate, Mixture) else made(plate) for plate in plates]
+        mixtures = [plate if isinstance(plate, Mixture) else mixture_of(plate) for plate in plates]
         return cls(shape=mixtures[0].shape, readers=tuple(plate.reader() for plate in mixtures), seen=seen)
 
     def over_bands(self, run: Callable[[int, int], None]) -> None:

@@ -39,7 +39,7 @@ def one_or_all(
 
 def calibrate_all(voice: Voice, calibration: Calibration, pictures: Sequence[Path], *, out: Path, **given: Any) -> None:
     """Calibrate on each of several takes, and say what became of them; end with a fault where one failed."""
-    from psvideo.report.of_rigs import rigs_record
+    from psvideo.report.rigs_report import rigs_record
     from psvideo.runs.calibrate.of_takes import calibrate_takes
 
     results = calibrate_takes(calibration, pictures, out=out, **given)

@@ -9,7 +9,7 @@ from psvideo.formats.timing_json import read_timing
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.naming import named_by_rig, named_first
-from psvideo.sync.take_timing import find_take_timing
+from psvideo.sync.take_timing import find_timing
 
 
 def read_or_find_timing(
@@ -21,7 +21,7 @@ def read_or_find_timing(
     order comes from the ``rig`` where it can. Raises PsvideoError where the file belongs to another clip.
     """
     if given is None:
-        timing = find_take_timing(take, first_light=first_light, watch=watch)
+        timing = find_timing(take, first_light=first_light, watch=watch)
     else:
         timing = read_timing(given)
         wrong = _misfit(timing, take)

@@ -80,7 +80,7 @@ class ComparedPlates:
         return plates[light]
 
     def _timed(self) -> tuple["Take", Timing]:
-        from psvideo.plates.timed import read_or_find_timing
+        from psvideo.plates.named_timing import read_or_find_timing
         from psvideo.sync.open_take import open_take
 
         if self._take is None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psvideo.model.coded import Image
 from psvideo.plates.align.comb import SAMPLES
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import made
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 
 GUESSED = 1 / 1024
@@ -64,7 +64,7 @@ class _Sum:
         if self.total is None or self.weight is None:
             return middle
         mean = self.total / _like(np.maximum(self.weight, GUESSED), middle)
-        return replace(middle, picture=made(np.asarray(mean, np.float32)), seen=self.weight > 0)
+        return replace(middle, picture=mixture_of(np.asarray(mean, np.float32)), seen=self.weight > 0)
 
 
 def _weight(plate: LightPlate) -> NDArray[np.float32]:
