@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
+from psvideo.model.surface import Misfit
+from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judge.result import MEAN_OF_HELD, accuracy
 from psvideo.report.judge.rig_by_plates import lights_exchanged
+from psvideo.report.observe.alignment.astray import Astray
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.kept_facts import KeptFacts
+from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit, rig_fit
 
 
@@ -57,3 +64,39 @@ def test_other_faults_of_a_rig_are_no_exchange(lights: int, seed: int) -> None:
 
 def test_five_lights_do_not_tell_an_exchange() -> None:
     assert fit_of(ways(5)[[1, 0, 2, 3, 4]], seed=0).exchanged is None
+
+
+NAMES = tuple(f"lamp {n}" for n in range(8))
+MOVED = Astray(
+    typical_px=2.0, error_px=0.1, shift_px=2.0, turn_deg=0.0, zoom=0.0, radius_px=50.0, light="lamp 0", most_px=3.0,
+    agreement=0.9, light_that_fits_least="lamp 0", shows=True,
+)  # fmt: skip
+
+
+def observed_of(fit: RigFit, monkeypatch: pytest.MonkeyPatch, *, astray: list[Astray]) -> Observed:
+    """Return what a take would show whose rig fit is known, and whose normals are 6 degrees off."""
+    monkeypatch.setattr(Observed, "rig_fit", fit)
+    monkeypatch.setattr(Observed, "firing_lights", NAMES)
+    misfit = Misfit(share=0.1, error_deg=6.0 / MEAN_OF_HELD)
+    facts = InstantFacts(number=1, time_s=0.0, valid_share=0.9, clipped_share=0.0, unseen_share=0.0, misfit=misfit)
+    return Observed(lights=NAMES, facts=KeptFacts([facts]), astray=astray)
+
+
+def test_a_rig_that_does_not_fit_is_not_known_to_be_wrong_where_pictures_are_not_aligned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shifted = fit_of(np.roll(ways(8), 1, axis=0), seed=0)
+    moved, stood = (list(judge_rig(observed_of(shifted, monkeypatch, astray=one))) for one in ([MOVED], []))
+    assert [(line.subject, line.grade) for line in moved] == [("rig", "unknown")]
+    assert "See the line on motion" in moved[0].found
+    assert stood[0].grade in ("doubtful", "bad")
+
+
+def test_what_normals_are_off_by_is_laid_to_the_exchange(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = ways(8)
+    rig[[2, 5]] = rig[[5, 2]]
+    seen = observed_of(fit_of(rig, seed=0), monkeypatch, astray=[])
+    assert [line.found for line in accuracy(seen)] == [
+        "Beyond noise, a typical normal is off by about 6 degrees: two lights are exchanged."
+    ]
+    assert "'lamp 2' and 'lamp 5' are exchanged" in next(judge_rig(seen)).found
