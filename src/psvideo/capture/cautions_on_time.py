@@ -8,7 +8,7 @@ from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_st
 from psvideo.model.cost.motion_cost import LEAST_PX, cost_words, motion_cost
 from psvideo.model.cost.shoot_figures import ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
-from psvideo.model.units import show_seconds
+from psvideo.model.units import show_ppm, show_seconds
 
 MOST_LOST = 0.2
 """Where motion costs more of the normals than this share, people should know before they shoot."""
@@ -26,9 +26,9 @@ def about_the_margin(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
     rows = f" ({over_s / abs(plan.camera.row_time_s):.2g} rows of each frame)" if plan.camera.readout_s else ""
     yield warning(
         "margin",
-        f"The dark time leaves a margin of {margin:.4g} ppm, and the clocks may be {plan.clock_range_ppm:g} ppm "
-        "apart: then two "
-        f"flashes mix near the dark row{rows}. Leave `dark_s` out, or give at least {needed_s * 1e3:.6g}ms.",
+        f"The dark time leaves a margin of {show_ppm(margin)}, and the clocks may be "
+        f"{show_ppm(plan.clock_range_ppm)} apart: then two flashes mix near the dark row{rows}. Leave `dark_s` out, or "
+        f"give at least {needed_s * 1e3:.6g}ms.",
     )
 
 
@@ -66,7 +66,7 @@ def about_three_frames(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
     yield note(
         "three-frames",
         f"Up to {most:.0%} of the flashes reach into three frames; they are put together all the same. "
-        f"{_free_of_three(plan)}{_equation_11(plan, wide)}",
+        f"{_free_of_three(plan)}{_equation_11(plan, wide)}".rstrip(),
     )
 
 
@@ -92,14 +92,17 @@ def _free_of_three(plan: Plan) -> str:
 
 
 def _equation_11(plan: Plan, wide: list[SlotFigures]) -> str:
+    """Say which equal flashes lie in two frames each; flashes that must differ, as beside a long marker, have none."""
+    if len({plan.flashes[slot].duration_s for slot in plan.lit_slots}) > 1:
+        return ""
     exposure_s = plan.camera.exposure_s
     count = exposure_s / wide[0].duration_s
     below, above = exposure_s / math.ceil(count + 1e-9), exposure_s / max(math.floor(count + 1e-9), 2)
     choices = " or ".join(dict.fromkeys((show_seconds(above), show_seconds(below))))
+    all_of_them = "every flash" if all(flash.lit for flash in plan.flashes) else "every flash and dark slot"
     return (
-        f"Eq. 11 avoids it with flashes that divide the exposure, here {choices} for every flash and dark slot, but "
-        "only if "
-        "a trigger starts the first one with a frame and one clock drives both."
+        f"Eq. 11 avoids it with flashes that divide the exposure, here {choices} for {all_of_them}, but only if a "
+        "trigger starts the first one with a frame and one clock drives both."
     )
 
 

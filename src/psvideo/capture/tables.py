@@ -10,7 +10,7 @@ from psvideo.capture.cameras import CameraMode
 from psvideo.capture.planning import Shoot
 from psvideo.model.cost.shoot_figures import ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
-from psvideo.model.units import show_rate, show_seconds
+from psvideo.model.units import show_ppm, show_rate, show_seconds
 
 
 def shoot_report(shoot: Shoot, *, preset: CameraMode | None) -> Iterator[RenderableType]:
@@ -90,8 +90,8 @@ def _partial_rows(plan: Plan) -> str:
 def _margin(plan: Plan, figures: ShootFigures) -> str:
     if figures.margin_ppm is None or plan.mode != "rolling":
         return ""
-    known = "unknown" if plan.clock_tolerance_ppm is None else f"{plan.clock_tolerance_ppm:g} ppm"
-    return f", the exposure and a margin of {figures.margin_ppm:.4g} ppm (clocks: {known})"
+    known = "unknown" if plan.clock_tolerance_ppm is None else show_ppm(plan.clock_tolerance_ppm)
+    return f", the exposure and a margin of {show_ppm(figures.margin_ppm)} (clocks: {known})"
 
 
 def _per_flash(slots: Sequence[SlotFigures]) -> Table:

@@ -60,7 +60,9 @@ def refuse_blur_of_unknown_speed(limits: Limits) -> None:
 
 def _bounds(request: ShootRequest) -> list[Bound]:
     limits, exposure_s = request.limits, request.camera.exposure_s
-    bounds = [Bound(flash_s=LONGEST_SHARE_OF_EXPOSURE * exposure_s, why="longer would cost over a fifth of the rate")]
+    bounds = [
+        Bound(flash_s=LONGEST_SHARE_OF_EXPOSURE * exposure_s, why="the rate, of which longer ones cost over a fifth")
+    ]
     if limits.max_blur_px is not None and limits.speed_px_s is not None:
         blur = f"{limits.max_blur_px:g} px of blur at {limits.speed_px_s:g} px/s"
         bounds.append(Bound(flash_s=limits.max_blur_px / limits.speed_px_s, why=blur))

@@ -45,6 +45,15 @@ def show_seconds(seconds: float, *, figures: int = 4) -> str:
     return f"{seconds * 1e3:.{figures}g} ms" if in_ms else f"{seconds * 1e6:.{figures}g} us"
 
 
+def show_ppm(ppm: float) -> str:
+    """Return millionths as people write them, with four figures.
+
+    >>> show_ppm(10_000.4), show_ppm(0.12345), show_ppm(-1_000_000.0)
+    ('10000 ppm', '0.1235 ppm', '-1000000 ppm')
+    """
+    return f"{float(f'{ppm:.4g}'):.10g} ppm"
+
+
 def show_rate(fps: Fraction) -> str:
     """Return a frame rate with its exact ratio where it is no whole number.
 
