@@ -376,6 +376,17 @@ def test_three_frame_flashes_come_with_the_durations_of_equation_11() -> None:
     assert "three-frames" not in kinds(planned(readout="5ms"))
 
 
+@pytest.mark.parametrize(
+    ("marker", "said"),
+    [("dark", "for every flash and dark slot, but only"), ("none", "for every flash, but only"), ("long", None)],
+)
+def test_equal_flashes_are_offered_where_flashes_may_be_equal(marker: str, said: str | None) -> None:
+    text = text_of(planned(readout="10ms", flash="0.8ms", marker=marker), "three-frames")
+    assert "reach into three frames" in text
+    assert (said is None and "Eq. 11" not in text) or (said is not None and said in text)
+    assert text == text.strip()
+
+
 def test_a_misnamed_frame_rate_is_asked_about() -> None:
     assert "120000/1001" in text_of(planned(fps="120", readout="8ms"), "fps")
     assert "fps" not in kinds(planned(fps="119.88", readout="8ms"))
