@@ -23,22 +23,22 @@ from psvideo.sync.rowfit.tracking.losses import frame_losses
 FEW = 3
 """More frames that are missing (or repeated) in one place can stand for nearly any move."""
 LONE = 2
-"""So few frames beyond such a place fit somewhere by chance."""
+"""Up to this many frames beyond such a place may fit somewhere by chance."""
 LEAST, NEAR = 6, 36
 """Frames between two breaks that show where they are in time, and how many beside a break are asked."""
 MOST_BREAKS = 6
 """Where more breaks are, the camera loses frames, or nothing is right."""
 PARTS = 24
-"""Moves are tried in such parts of the shortest flash, up to a flash either way: farther off, whole frames fit no
-better than any place does."""
+"""Moves are tried in steps of the shortest flash over this, up to a flash either way: farther off, whole frames fit
+no better than any place does."""
 CLOSER, TURNS = 4.0, 5
-"""Then ever nearer, each time in so much smaller steps."""
+"""Then nearer, each time in steps that are smaller by the first, as often as the second says."""
 CLEARLY, LESS = 50.0, 0.87
-"""A move is believed that leaves so much less of the robust loss, and less than this share of it,"""
+"""A move is believed that leaves this much less of the robust loss, and less than this share of it,"""
 SURE = 10.0
-"""and that is larger than so many standard errors of the times, which it makes up from two sides."""
+"""and that is larger than this many standard errors of the times, which it makes up from two sides."""
 TICKS = 1_000_000
-"""Places in time between frames are counted in such parts of a frame."""
+"""Places in time between frames are counted in this many parts of a frame."""
 
 
 def moved(rows: Profiles, shift_s: float, frames: slice = slice(None)) -> Profiles:
