@@ -160,11 +160,15 @@ def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, s
     if not path.exists():
         return
     empty = path.is_dir() and not any(path.iterdir())
-    if not empty and (footage or not (path / mark).is_file()):
-        found = "holds a plan.toml" if footage else f"holds no {mark}"
+    if footage:
         raise UsageError(
-            f"{path}: {found}, so it is nothing that this command wrote, and is not replaced, not even with `force`. "
-            "Name another output."
+            f"{path}: exists already and holds a plan.toml: footage is never replaced, not even with `force`. Name "
+            "another output."
+        )
+    if not empty and not (path / mark).is_file():
+        raise UsageError(
+            f"{path}: holds no {mark}, so it is nothing that this command wrote, and is not replaced, not even with "
+            "`force`. Name another output."
         )
 
 

@@ -116,8 +116,9 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
     if len(apart) > 1:
         return apart
     inner = between_lone_ends(whole) if believed else None
-    if inner:
-        return found_within(plan, rows, inner)
+    within = found_within(plan, rows, inner) if inner else []
+    if within:
+        return within
     parts = found_in_parts(plan, rows)
     if not parts:
         parts = found_beside_dark(plan, rows)

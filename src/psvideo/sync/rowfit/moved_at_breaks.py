@@ -74,7 +74,8 @@ def between_lone_ends(found: ClipFit) -> slice | None:
     """Return a clip's frames but for one or two lit ones at an end, with those in the dark beyond, that many missing
     frames part from the others; None where there are none.
 
-    A strobe that stops within a frame leaves one that fits somewhere by chance.
+    A strobe that stops within a frame leaves one that fits somewhere by chance. Where many frames
+    within are told as repeated ones, they show something else, and nothing is said of the ends.
     """
     index = found.track.index
     fitted = np.flatnonzero(~found.track.repeated & ~found.unlit)
@@ -82,7 +83,8 @@ def between_lone_ends(found: ClipFit) -> slice | None:
     early, late = holes[holes <= LONE], holes[holes >= len(fitted) - LONE]
     first = int(fitted[early[-1]]) if len(early) else 0
     end = int(fitted[late[0]]) if len(late) else len(index)
-    return slice(first, end) if end - first < len(index) else None
+    nothing = end - first == len(index) or np.count_nonzero(found.track.repeated[first:end]) > FEW
+    return None if nothing else slice(first, end)
 
 
 def _breaks(stray: IntArray) -> Iterator[_Break]:
