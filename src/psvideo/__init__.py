@@ -48,7 +48,7 @@ _HOMES = {
     "Timing": "psvideo.model.timing",
     "check": "psvideo.runs.check",
     "find_depth": "psvideo.solve.depth.shaping",
-    "find_timing": "psvideo.sync.take_timing:find_timing",
+    "find_timing": "psvideo.sync.take_timing",
     "gather": "psvideo.plates.gather",
     "normals": "psvideo.runs.normals",
     "normals_of_takes": "psvideo.runs.many_takes.normals_of_takes",
@@ -110,8 +110,7 @@ def __getattr__(name: str) -> Any:
         return version("psvideo")
     if name not in _HOMES:
         raise AttributeError(f"module 'psvideo' has no attribute {name!r}")
-    module, _, other = _HOMES[name].partition(":")
-    found = getattr(import_module(module), other or name)
+    found = getattr(import_module(_HOMES[name]), name)
     globals()[name] = found = _answering(name, found) if isinstance(found, FunctionType) else found
     return found
 
