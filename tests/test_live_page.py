@@ -169,6 +169,16 @@ def test_two_viewers_and_one_that_comes_and_goes(served: Served) -> None:
         assert asked(two, number)[0]["number"] == number + 1
 
 
+@pytest.mark.parametrize("odd", ['{"seen": Infinity, "plate": ""}', "[]", "nothing", "{}"])
+def test_an_odd_request_is_answered_as_one_that_has_seen_nothing(odd: str, served: Served) -> None:
+    page, pictures, results, camera, _ = served
+    pictures.put(results[0], camera)
+    with connected(page.url) as viewer:
+        viewer.send(odd)
+        assert json.loads(viewer.recv(timeout=10))["pictures"] > 0
+        assert page.viewers == 1
+
+
 def test_only_this_machine_sees_it_without_a_token(served: Served) -> None:
     page = served[0]
     assert fetched(page.url)[0] == 200

@@ -96,23 +96,28 @@ class LivePage:
         from websockets.exceptions import ConnectionClosed
 
         self.viewers += 1
+        try:
+            with contextlib.suppress(ConnectionClosed):  # a browser may go at any moment
+                self._answer_requests(connection)
+        finally:
+            self.viewers -= 1
+
+    def _answer_requests(self, connection: "ServerConnection") -> None:
         before = 0
-        with contextlib.suppress(ConnectionClosed):  # a browser may go at any moment
-            for message in connection:
-                if message == BALL:
-                    self.ball()
-                    continue
-                asked = _asked(message)
-                if asked[0] != before:
-                    self.pictures.drawn(asked[0], time.monotonic())
-                before = asked[0]
-                self.pictures.wait(asked[0], WAIT_S)
-                number, blocks = self.pictures.packed(asked[1])
-                blocks = [] if number == asked[0] else blocks
-                connection.send(json.dumps({"number": number, "pictures": len(blocks)} | dict(self.told())))
-                for one in blocks:
-                    connection.send(one)
-        self.viewers -= 1
+        for message in connection:
+            if message == BALL:
+                self.ball()
+                continue
+            asked = _asked(message)
+            if asked[0] != before:
+                self.pictures.drawn(asked[0], time.monotonic())
+            before = asked[0]
+            self.pictures.wait(asked[0], WAIT_S)
+            number, blocks = self.pictures.packed(asked[1])
+            blocks = [] if number == asked[0] else blocks
+            connection.send(json.dumps({"number": number, "pictures": len(blocks)} | dict(self.told())))
+            for one in blocks:
+                connection.send(one)
 
 
 def live_page(
@@ -166,7 +171,7 @@ def _asked(message: str | bytes) -> tuple[int, str]:
     try:
         asked = json.loads(message)
         return int(asked["seen"]), str(asked["plate"])
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         return 0, ""
 
 
