@@ -95,7 +95,7 @@ WRONG_PLACE = {
     "the clip for the results": (
         ["normals", "{clip}", "--rig", "{clip}/rig.toml", "-o", "{clip}"],
         2,
-        "exists already and holds a plan.toml: footage is never replaced",
+        "exists already and holds a plan.toml: it is footage, and not replaced",
     ),
     "a command misspelled": (["normal", "{clip}"], 2, "there is no command 'normal'; did you mean 'normals'?"),
     "no rig": (["normals", "{clip}", "-o", "{tmp}/o"], 2, "the file that says where the lights are"),

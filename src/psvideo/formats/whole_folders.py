@@ -162,8 +162,8 @@ def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, s
     empty = path.is_dir() and not any(path.iterdir())
     if footage:
         raise UsageError(
-            f"{path}: exists already and holds a plan.toml: footage is never replaced, not even with `force`. Name "
-            "another output."
+            f"{path}: exists already and holds a plan.toml: it is footage, and not replaced, not even with `force`. "
+            "Name another output."
         )
     if not empty and not (path / mark).is_file():
         raise UsageError(
