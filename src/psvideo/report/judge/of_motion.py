@@ -86,8 +86,8 @@ def _places(observed: Observed) -> Judgement:
             subject="motion",
             grade="unknown",
             found="Whether the pictures are aligned is not known: their fine detail does not fit together, that of "
-            f"{found.light_that_fits_least!r} least. So it is where there is little but noise, where surfaces shine, "
-            "and where pictures lie far apart or under other lights than is said.",
+            f"{found.light_that_fits_least!r} least. This happens where there is little but noise, where surfaces "
+            "shine, and where pictures lie far apart or under other lights than is said.",
         )
     return Judgement(
         subject="motion", grade="good", found=f"The pictures are aligned to within {max(found.within_px, 0.1):.1f} px."

@@ -30,7 +30,7 @@ sphere hardly more, and only of a flat uniform surface, or by clipping, as many.
 LEVEL = 0.02
 """Flat surfaces are as bright as their lights; clipped ones are alike under all, within two codes of 10 bits."""
 ALONE = 2.4
-"""One light's flash shows in two frames. A level that shows in so many frames a round is that of several lights."""
+"""One light's flash shows in two frames. A level that shows in this many frames a round is that of several lights."""
 DIMMEST = 0.05
 """Of samples at the level, this share is darker than the code that is advised, so that the others count as clipped."""
 

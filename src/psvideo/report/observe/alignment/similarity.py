@@ -3,7 +3,7 @@
 A tripod that is knocked, a lens that breathes as it focuses and a camera that rolls move parts of a picture by
 different amounts, so that no shift is common to them. Where parts say different things even so, shape or shine
 speaks and no motion: what they differ by gives the standard error, and parts that differ much count little (least
-absolute distances, by weights that are found again and again).
+absolute distances, by weights that are found again in every pass).
 """
 
 from collections.abc import Sequence
