@@ -53,7 +53,7 @@ blender: $(VENV)/.installed-test .venv-blender/.installed
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m bench
 
-# The pages as a site in docs/_site; a warning is an error. The tests build it too.
+# The pages as a site in docs/_site; a warning is an error. The campaigns build it too.
 docs: $(VENV)/.installed-test
 	$(BIN)/python -m docs.figures.commands
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d docs/_site/.trees . docs/_site

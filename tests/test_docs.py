@@ -235,6 +235,7 @@ def test_the_api_page_describes_every_name_of_the_front_door() -> None:
     assert sorted(described) == sorted(ps.__all__)
 
 
+@pytest.mark.campaign
 def test_the_site_builds_without_a_warning_and_needs_nothing_from_the_net(tmp_path: Path) -> None:
     pytest.importorskip("sphinx")
     done = subprocess.run(

@@ -33,6 +33,7 @@ def timed(case: Case, seed: int) -> tuple[Timing, float]:
     return timing, float(np.sqrt(np.mean(error_s**2))) / case.plan.camera.row_time_s
 
 
+@pytest.mark.campaign
 def test_slow_leds_show_on_a_subject_that_tumbles_with_everything_else_unknown() -> None:
     timing, off_rows = timed(replace(EVERYTHING, frames=150), seed=1)
     assert timing.order == "marker"

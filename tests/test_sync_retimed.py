@@ -134,6 +134,7 @@ def test_a_pattern_with_a_hole_of_its_own_is_followed(plan: Plan) -> None:
     assert_placed(retimed(plan, shown), shown)
 
 
+@pytest.mark.campaign
 def test_an_unknown_clock_and_readout_do_not_hide_a_pattern(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=80, width_px=12, readout=0.7, clock_tolerance_ppm=10_000)
     unknown = replace(plan, clock_tolerance_ppm=None, camera=replace(plan.camera, readout_s=None))
