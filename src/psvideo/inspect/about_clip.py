@@ -17,7 +17,8 @@ from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findin
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.rows.clipping import SATURATED
 from psvideo.model.units import counted, listed
-from psvideo.report.judge.of_saturation import hidden_saturation, may_hide, numbers_to_look_at
+from psvideo.report.judge.of_saturation import hidden_saturation
+from psvideo.report.observe.hidden_level import may_hide, numbers_to_look_at
 
 MANY = 3
 SATURATED_SHARE = 0.01

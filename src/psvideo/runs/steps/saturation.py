@@ -1,8 +1,9 @@
 """Some of a take's frames, looked at for light that the sensor clipped and the plan does not know of."""
 
 from psvideo.clip import Take, read_frames
-from psvideo.report.judge.of_saturation import hidden_saturation, may_hide, numbers_to_look_at
+from psvideo.report.judge.of_saturation import hidden_saturation
 from psvideo.report.judgement import Judgement
+from psvideo.report.observe.hidden_level import may_hide, numbers_to_look_at
 
 
 def saturation_of(take: Take) -> Judgement | None:
