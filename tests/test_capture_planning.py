@@ -144,10 +144,10 @@ def test_the_largest_blur_becomes_the_longest_flash_that_keeps_it(blur_px: float
         assert longest_px >= 0.98 * blur_px
 
 
-@given(st.floats(0.002, 0.2), st.integers(1, 8))
-def test_the_largest_duty_is_kept_and_used_up(duty: float, count: int) -> None:
+@given(st.floats(0.002, 0.2), st.integers(1, 8), st.sampled_from(["none", "long"]))
+def test_the_largest_duty_is_kept_and_used_up(duty: float, count: int, marker: str) -> None:
     lights = ",".join(f"l{index}" for index in range(count))
-    shoot = planned(flash=None, max_duty=str(duty), lights=lights, marker="none")
+    shoot = planned(flash=None, max_duty=str(duty), lights=lights, marker=marker)
     most = max(light.duty for light in shoot.figures.lights)
     assert most <= duty * (1 + 1e-9)
     if "duty" in (shoot.chosen or ""):
@@ -367,7 +367,12 @@ def test_lights_that_will_stand_in_one_plane_are_warned_of(tmp_path: Path, third
     tables = "".join(f'[[light]]\nname = "{name}"\ndirection = {at}\nintensity = 1.0\n' for name, at in places.items())
     (tmp_path / "rig.toml").write_text('schema = "psvideo-rig/1"\n' + tables, encoding="utf-8")
     shoot = capture_plan(parse_request(words()), rig=tmp_path / "rig.toml")
-    assert any(caution.kind == "rig" and "in one plane" in caution.text for caution in shoot.cautions) == warned
+    said = [caution for caution in shoot.cautions if caution.kind == "rig"]
+    assert [caution.level for caution in said] == ["warning" if warned else "note"]
+    assert ("in one plane" in said[0].text) == warned
+    directions = np.array([*places.values()])
+    scaled = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    assert warned or f"is {np.linalg.cond(scaled):.2f} " in said[0].text
 
 
 def test_three_frame_flashes_come_with_the_durations_of_equation_11() -> None:
@@ -444,3 +449,11 @@ def test_the_chosen_flash_never_exceeds_any_bound(pulse_s: float, duty: float) -
     figures = shoot_figures(make_plan(request, {"a": flash_s, "b": flash_s}))
     assert flash_s <= pulse_s * (1 + 1e-9)
     assert figures.lights[0].duty <= duty * (1 + 1e-9)
+
+
+def test_a_known_speed_shows_the_blur_of_a_flash_that_the_leds_decide() -> None:
+    shoot = planned(flash=None, max_duty="5%", speed="800")
+    assert "duty" in (shoot.chosen or "")
+    assert all(slot.blur_px == pytest.approx(800 * slot.duration_s) for slot in shoot.figures.slots)
+    with pytest.raises(UsageError, match="`max_blur_px` needs `speed_px_s`"):
+        planned(flash=None, speed="800")

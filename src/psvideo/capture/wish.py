@@ -36,18 +36,18 @@ def longest_flash(request: ShootRequest) -> Bound:
     """
     limits = request.limits
     refuse_blur_of_unknown_speed(limits)
-    if limits.max_blur_px is None and limits.speed_px_s is not None:
-        raise UsageError(NEEDS_SPEED)
     unlimited = limits.max_blur_px is None and limits.max_duty is None and limits.max_pulse_s is None
     if unlimited and request.mode == "synced" and _open_s(request) > 0:
-        return Bound(flash_s=_open_s(request) / (LONG_MARKER if request.marker == "long" else 1.0), why=OPEN)
+        return Bound(flash_s=_open_s(request) / _longest_by(request), why=OPEN)
     if unlimited:
+        if limits.speed_px_s is not None:
+            raise UsageError(NEEDS_SPEED)
         raise UsageError(
             "Nothing says how long a flash should be. Give `flash_s` 0.8ms, or what limits it: `max_blur_px` 1 "
             "`speed_px_s` 800 (px/s), `max_duty` 0.1, `max_pulse_s` 1ms."
         )
     tightest = min(_bounds(request), key=lambda bound: bound.flash_s)
-    flash_s = _rounded_down(tightest.flash_s / (LONG_MARKER if request.marker == "long" else 1.0))
+    flash_s = _rounded_down(tightest.flash_s / _longest_by(request))
     _refuse_too_dark(request, flash_s, tightest)
     return Bound(flash_s=flash_s, why=tightest.why)
 
@@ -85,14 +85,23 @@ def _open_s(request: ShootRequest) -> float:
 
 
 def flash_for_duty_s(request: ShootRequest, max_duty: float) -> float:
-    """Return the flash at which each of the lights, flashing once a round, is on for ``max_duty`` of the time."""
-    period_s, share = request.camera.frame_period_s, max_duty * len(request.lights)
+    """Return the longest flash at which each of the lights, flashing once a round, is on for ``max_duty`` of the time.
+
+    That is the long marker's where there is one; the other lights' flashes are shorter then, and the round with them.
+    """
+    period_s, count = request.camera.frame_period_s, len(request.lights)
     if request.mode != "rolling":
-        return share * period_s * (2 if request.mode == "half-rate" else 1)
+        return max_duty * count * period_s * (2 if request.mode == "half-rate" else 1)
     dark_s = request.dark_s or default_dark_s(
         request.camera, (), mode="rolling", clock_tolerance_ppm=request.clock_tolerance_ppm
     )
-    return share * dark_s / (1 - share) if share < 1 else math.inf
+    lit_share = max_duty * (1 + (count - 1) / _longest_by(request))
+    return max_duty * count * dark_s / (1 - lit_share) if lit_share < 1 else math.inf
+
+
+def _longest_by(request: ShootRequest) -> float:
+    """Return how many times the longest flash is as long as the others."""
+    return LONG_MARKER if request.marker == "long" else 1.0
 
 
 def _refuse_too_dark(request: ShootRequest, flash_s: float, tightest: Bound) -> None:

@@ -53,7 +53,7 @@ def capture_plan(
 
 
 def _about_the_rig(plan: Plan, path: Path) -> tuple[Caution, ...]:
-    """Say where the lights' places give no normals. Raises PsvideoError where the rig lacks a light of the plan."""
+    """Say whether the lights give normals, and how well. Raises PsvideoError where the rig lacks a planned light."""
     known = read_rig(path, plan_lights=plan.lights)
     lights = lights_as_planned(known, plan)
     if len(lights) < LEAST_LIGHTS:
@@ -62,10 +62,11 @@ def _about_the_rig(plan: Plan, path: Path) -> tuple[Caution, ...]:
     near = is_near(lights)
     ground = ground_of(known, height_px=camera.height_px, width_px=camera.width_px) if near else None
     try:
-        illumination(lights, channels=3, ground=ground)
+        lit = illumination(lights, channels=3, ground=ground)
     except PsvideoError as fault:
         return (Caution(kind="rig", level="warning", text=f"{path}: {fault}"),)
-    return ()
+    noise = f"The lights of {path} give normals. The condition number of their directions is {lit.condition:.2f}"
+    return (Caution(kind="rig", level="note", text=f"{noise} (1 is best; noise grows with it)."),)
 
 
 def plan_text(shoot: Shoot) -> str:
