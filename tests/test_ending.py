@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,9 @@ import pytest
 import psvideo
 from psvideo.cli import app
 from psvideo.cli.ending import ENDING, paragraph_on, stoppable
+
+ENDS_S = 2.9
+"""The end of a process waits for threads for 3 s."""
 
 
 @pytest.mark.parametrize("number", ENDING)
@@ -118,3 +122,26 @@ def test_no_run_asks_what_time_it_is() -> None:
     found = [path.relative_to(root) for path in root.rglob("*.py") if asking.search(path.read_text(encoding="utf-8"))]
     assert found
     assert all("strobe" in path.parts for path in found)
+
+
+def test_a_command_may_be_stopped_twice_before_a_signal_ends_it_at_once() -> None:
+    script = (
+        "import os, signal, time\nfrom psvideo.cli.ending import stoppable\nwith stoppable(), stoppable(stops=2):\n"
+        " for stop in range(3):\n  try:\n   os.kill(os.getpid(), signal.SIGINT)\n   time.sleep(60)\n"
+        "  except KeyboardInterrupt:\n   print(stop, flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], timeout=30, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "0\n1\n")
+
+
+def test_a_command_that_is_over_waits_for_no_thread_that_goes_on_beside_it() -> None:
+    script = (
+        "import sys, time\nfrom psvideo.cli import app\nfrom psvideo.compute.side_threads import run_beside\n"
+        "def run(arguments):\n run_beside(lambda: time.sleep(60), name='compiling')\n"
+        " print('said', end='')\n return 3\n"
+        "app._run = run\nsys.exit(app.main())\n"
+    )
+    began_s = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", script], timeout=60, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (3, "said")
+    assert time.monotonic() - began_s < ENDS_S, "at the interpreter's own end it is waited for longer"

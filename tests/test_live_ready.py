@@ -29,6 +29,7 @@ from psvideo.live.status import SAID, LiveState, LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
+from psvideo.model.timing import Order
 from psvideo.runs.live import live
 from psvideo.synth import TrueClock, expose
 
@@ -85,7 +86,7 @@ def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: 
     assert gc.get_freeze_count() == 0
 
 
-def standing(*, at_s: float, state: LiveState, fps: float, frames: int) -> LiveStatus:
+def standing(*, at_s: float, state: LiveState, fps: float, frames: int, order: Order | None = None) -> LiveStatus:
     return LiveStatus(
         at_s=at_s,
         state=state,
@@ -98,6 +99,7 @@ def standing(*, at_s: float, state: LiveState, fps: float, frames: int) -> LiveS
         oldest_s=None,
         phase_error_rows=None,
         clock_offset_ppm=None,
+        order=order,
         width_px=96,
         height_px=72,
     )
@@ -114,6 +116,15 @@ def test_where_lines_stay_one_comes_when_something_changes_and_every_ten_seconds
     lines = capsys.readouterr().err.splitlines()
     assert [line.split(" | ")[0] for line in lines] == [SAID["seeking"], *[SAID["locked"]] * 4, SAID["lost"]]
     assert [line.split(" | ")[2].split()[0] for line in lines] == ["1", "2", "12", "22", "28", "30"]
+
+
+def test_the_line_says_where_names_are_a_guess() -> None:
+    lines = {
+        order: standing(at_s=1.0, state="locked", fps=100.0, frames=100, order=order).line
+        for order in ("guess", "marker")
+    }
+    assert "locked | NAMES OF LIGHTS ARE A GUESS | 100.0 fps" in lines["guess"]
+    assert "GUESS" not in lines["marker"]
 
 
 def test_what_is_compiled_is_counted_and_said_until_it_is_done() -> None:

@@ -166,3 +166,71 @@ def test_nothing_appears_where_no_frame_was_recorded(clip: Path, tmp_path: Path)
     with pytest.raises(ps.PsvideoError, match="there is no such clip"):
         live(clip / "none", record=tmp_path / "rec", pace="fastest")
     assert not (tmp_path / "rec").exists()
+
+
+def test_a_second_stop_leaves_out_what_waits_for_a_slow_disk_and_nothing_hidden(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, source = code_files.write_codes, played_clip(open_clip(clip))
+
+    def slow(path: Path, codes: np.ndarray) -> None:
+        time.sleep(0.05)
+        write(path, codes)
+
+    monkeypatch.setattr(recording, "write_codes", slow)
+    first = next(source.frames())
+    made: list[Recording] = []
+
+    def stopped() -> None:
+        with recording.recording(tmp_path / "rec", source, force=False) as record:
+            made.append(record)
+            for index in range(200):
+                record.take(replace(first, index=index))
+            time.sleep(0.12)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    assert [path.name for path in tmp_path.iterdir()] == ["rec"]
+    assert 1 <= len(ps.open_take(tmp_path / "rec").numbers) == made[0].written < 20
+    assert "more frames waited for the disk" in made[0].ended
+
+
+def test_a_run_that_is_stopped_before_its_first_frame_leaves_nothing(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("psvideo.runs.live.rehearse", lambda *_, **__: time.sleep(2.5))
+    with pytest.raises(KeyboardInterrupt):
+        live(clip, record=tmp_path / "rec", said=stopping(lambda status: status.state == "preparing"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_log_that_finds_no_room_costs_no_recording(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = played_clip(open_clip(clip), pace="fastest")
+
+    def full(path: Path, *_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    with recording.recording(tmp_path / "rec", source, force=False) as record:
+        record.take(next(source.frames()))
+        record.log = "what was played"
+        monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.undo()
+    assert len(ps.open_take(tmp_path / "rec").numbers) == 1
+    assert "strobe.json could not be written (No space left on device)" in record.ended
+
+
+def test_the_timing_of_a_run_that_is_recorded_is_the_recordings(clip: Path, tmp_path: Path) -> None:
+    shutil.copytree(clip, tmp_path / "holed")
+    for file in sorted((tmp_path / "holed" / "frames").iterdir()):
+        number = int(file.stem.rpartition(".")[2])
+        file.rename(file.with_name(f"shot.{number + 500:06d}{file.suffix}"))
+    sorted((tmp_path / "holed" / "frames").iterdir())[70].unlink()
+    rec = tmp_path / "rec"
+    live(tmp_path / "holed", record=rec, timing_out=tmp_path / "timing.json", pace="fastest")
+    timing, of_recording = ps.read_timing(tmp_path / "timing.json"), ps.find_timing(ps.open_take(rec))
+    assert timing.clip == of_recording.clip == "rec"
+    assert timing.dropped_frames == of_recording.dropped_frames
+    assert timing.dropped_frames

@@ -8,9 +8,11 @@ import pytest
 from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
+from psvideo.formats.timing_json import parse_timing, timing_record
 from psvideo.live.chain import Chain, LiveFrame
 from psvideo.live.following.follow import Follower, Hole, State, caught_up
 from psvideo.live.following.history import timing_of
+from psvideo.live.following.light_names import guess_words, order_of
 from psvideo.live.following.lock import check_followed, frames_to_lock, lock
 from psvideo.live.following.phase_filter import Measured, smoothed
 from psvideo.model.camera import FloatArray
@@ -180,3 +182,53 @@ def test_the_smoothed_clock_is_better_than_the_filtered_one() -> None:
 def test_a_synced_plan_is_refused_in_one_paragraph(make_plan: PlanMaker) -> None:
     with pytest.raises(UsageError, match="Record the take"):
         check_followed(make_plan(mode="synced"))
+
+
+UNMARKED = {"lights": ("key", "left", "right", "top"), "dark": False, "width_px": 8, "height_px": 96}
+
+
+def taken(chain: Chain, images: list[np.ndarray]) -> Chain:
+    for index, image in enumerate(images):
+        chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
+    return chain
+
+
+def test_names_after_a_second_lock_are_a_guess_and_said_to_be(make_plan: PlanMaker) -> None:
+    plan = make_plan(**UNMARKED)
+    before = shoot(plan, frames=90)
+    named = next(flash for flash in before.flashes if flash.start_s > 0).lights
+    first_light = next(iter(named))
+    chain = taken(Chain(plan=plan, first_light=first_light), list(before.frames))
+    known = timing_of(chain.followed, clip="clip", first_light=first_light)
+    assert (known.order, known.order_note) == ("given", "")
+    again = shoot(plan, frames=110, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))
+    chain = taken(Chain(plan=plan, first_light=first_light), [*before.frames, *again.frames])
+    assert len(chain.followed) == 2
+    timing = timing_of(chain.followed, clip="clip", first_light=first_light)
+    assert timing.order == "guess"
+    assert timing.order_note == guess_words(chain.followed, first_light=first_light)
+    assert "found again at" in timing.order_note
+    assert "`first_light` speaks of the first frames alone" in timing.order_note
+    assert parse_timing(timing_record(timing), source="timing.json").order_note == timing.order_note
+
+
+@pytest.mark.parametrize("first_light", ["key", None])
+def test_names_after_a_first_search_that_failed_are_a_guess_and_said_to_be(
+    make_plan: PlanMaker, first_light: str | None
+) -> None:
+    plan = make_plan(**UNMARKED)
+    dark = np.zeros((plan.camera.height_px, plan.camera.width_px), np.float32)
+    chain = taken(Chain(plan=plan, first_light=first_light), [*[dark] * 100, *shoot(plan, frames=90).frames])
+    assert chain.state == "locked"
+    assert order_of(chain.followed) == "guess"
+    said = guess_words(chain.followed, first_light=first_light)
+    assert ("was found in later ones" if first_light else "the picture shows no marker") in said
+
+
+def test_names_that_a_marker_shows_are_no_guess_however_often_the_strobe_is_found(make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=8, height_px=96)
+    again = shoot(plan, frames=110, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))
+    chain = taken(Chain(plan=plan), [*shoot(plan, frames=90).frames, *again.frames])
+    assert len(chain.followed) == 2
+    assert order_of(chain.followed) == "marker"
+    assert not guess_words(chain.followed, first_light=None)

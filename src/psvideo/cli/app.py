@@ -11,7 +11,15 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import compiling_said, libraries_aside
-from psvideo.cli.ending import check_addresses, nobody_reads, paragraph_on, say_any_name, starving_said, stoppable
+from psvideo.cli.ending import (
+    check_addresses,
+    leave_threads,
+    nobody_reads,
+    paragraph_on,
+    say_any_name,
+    starving_said,
+    stoppable,
+)
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
@@ -79,9 +87,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     say_any_name()  # before signals are heard: a stream that is interrupted while it changes prints no more
     try:
         with stoppable():
-            return _run(arguments)
+            status = _run(arguments)
     except KeyboardInterrupt:  # the command line library catches it only inside a command
-        return _stopped(_words(arguments))
+        status = _stopped(_words(arguments))
+    if arguments is None:  # this process is the command's own
+        leave_threads(status)
+    return status
 
 
 def _words(arguments: Sequence[str] | None) -> list[str]:

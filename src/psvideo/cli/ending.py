@@ -13,6 +13,7 @@ from importlib import import_module
 from types import FrameType
 
 from psvideo.cli.spelling import spelled
+from psvideo.compute.side_threads import still_at_work
 from psvideo.errors import PsvideoError
 
 if sys.platform != "win32":
@@ -30,14 +31,17 @@ UNMAPPED = ("failed to map segment", "Cannot allocate memory", "can't start new 
 """What loaders and systems say where an address space is full, in errors of many kinds."""
 STDERR = 2
 """Its number; written to directly where there is no memory for more."""
+LEAVES_S = 0.3
+"""Threads that are at work when a command is over are waited for this long: what only has to be noticed takes less."""
 LEAST_BYTES = 1200 << 20
 """Addresses that a run's libraries take before its first picture (measured: 1,000 MB), with room for small ones."""
 
 
 @contextlib.contextmanager
-def stoppable() -> Iterator[None]:
+def stoppable(*, stops: int = 1) -> Iterator[None]:
     """In this block, what asks a program to end stops it as Ctrl-C does: what it writes is closed, lights become dark.
-    A second such signal ends it at once, which costs no more than a kill. Signals that are ignored stay so (nohup).
+    One more such signal than ``stops`` ends it at once, which costs no more than a kill. Signals that are ignored stay
+    so (nohup).
 
     Python drops what is raised while it clears something away, or is called back by C (a compiler that keeps what it
     made); a stop that fell there is asked for again, and what goes wrong for its sake until then is the stop.
@@ -45,7 +49,7 @@ def stoppable() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard = _Heard()
+    heard = _Heard(stops)
     before = {number: signal.getsignal(number) for number in ENDING}
     obeyed = [number for number, handler in before.items() if handler not in (signal.SIG_IGN, None)]
     sys.unraisablehook = heard.dropped
@@ -54,7 +58,7 @@ def stoppable() -> Iterator[None]:
     try:
         yield
     except Exception as fault:
-        if heard.later and not heard.asked:
+        if heard.pending:
             raise KeyboardInterrupt from fault
         raise
     finally:
@@ -66,22 +70,23 @@ def stoppable() -> Iterator[None]:
 
 
 class _Heard:
-    """The stops that were heard: ``asked`` for once already, and those that Python dropped, to be raised ``later``."""
+    """The stops that were heard, of ``left`` that stop; those that Python dropped are to be raised ``later``, and
+    ``pending`` until then."""
 
-    def __init__(self) -> None:
-        self.asked = False
+    def __init__(self, stops: int) -> None:
+        self.left, self.pending = stops, False
         self.is_dropping = False
         self.later: list[threading.Timer] = []
         self.say_dropped = sys.unraisablehook
 
     def stop(self, number: int, frame: FrameType | None) -> None:
-        """Stop the command on its first signal, end the process on its second."""
+        """Stop the command while any stop is left, end the process afterwards."""
         if self.is_dropping:
             self._stop_later(number)
             return
-        if self.asked:
+        if not self.left:
             os._exit(PsvideoError.exit_status)
-        self.asked = True
+        self.left, self.pending = self.left - 1, False
         raise KeyboardInterrupt(number)
 
     def dropped(self, what: "sys.UnraisableHookArgs") -> None:
@@ -89,7 +94,7 @@ class _Heard:
         if not (isinstance(what.exc_value, KeyboardInterrupt) and what.exc_value.args):
             self.say_dropped(what)
             return
-        self.asked, self.is_dropping = False, True
+        self.left, self.pending, self.is_dropping = self.left + 1, True, True
         self._stop_later(*what.exc_value.args)
         self.is_dropping = False
 
@@ -138,6 +143,16 @@ def check_addresses() -> None:
             "limit, or one on memory in use (a cgroup's), then run the command again."
         )
     import_module("scipy.linalg")
+
+
+def leave_threads(status: int) -> None:
+    """End the process at once where a thread is still at work beside it: the interpreter's own end would wait for the
+    compiler, whose lock that thread holds, and could crash in others."""
+    if still_at_work(LEAVES_S):
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(status)
 
 
 def say_any_name() -> None:

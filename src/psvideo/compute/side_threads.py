@@ -2,6 +2,7 @@
 
 import atexit
 import threading
+import time
 import weakref
 from collections.abc import Callable
 
@@ -23,6 +24,14 @@ def run_beside(run: Callable[[], None], *, name: str) -> threading.Thread:
     _running.add(thread)
     thread.start()
     return thread
+
+
+def still_at_work(most_s: float) -> bool:
+    """Return whether any such thread is at work yet, after waiting for them for ``most_s`` altogether."""
+    until_s = time.monotonic() + most_s
+    for thread in list(_running):
+        thread.join(max(until_s - time.monotonic(), 0.0))
+    return any(thread.is_alive() for thread in list(_running))
 
 
 @atexit.register

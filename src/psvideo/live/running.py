@@ -14,6 +14,7 @@ from psvideo.compute.heap import no_looks_at_what_is_loaded
 from psvideo.compute.side_threads import run_beside
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.following.holding import Holding
+from psvideo.live.following.light_names import guess_words, order_of
 from psvideo.live.incoming.behind import Behind
 from psvideo.live.incoming.recording import Recording
 from psvideo.live.incoming.source import LiveSource
@@ -246,6 +247,7 @@ class Running:
             oldest_s=max(ages_s, default=None),
             phase_error_rows=None if follower is None else follower.error_rows,
             clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
+            order=None if follower is None else order_of(chain.followed),
             width_px=camera.width_px,
             height_px=camera.height_px,
             why=chain.why,
@@ -280,4 +282,5 @@ class Running:
         """What there is to say of the run."""
         ended = "" if self.recording is None else self.recording.ended
         refused = "" if self.holding is None else self.holding.note
-        return (*self.source.notes, *self.notes, *filter(None, (ended, refused)))
+        named = guess_words(self.chain.followed, first_light=self.chain.first_light)
+        return (*self.source.notes, *self.notes, *filter(None, (named, ended, refused)))

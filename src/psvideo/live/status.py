@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from typing import Literal
 
 from psvideo.live.following.follow import State
+from psvideo.model.timing import Order
 
 LiveState = Literal["preparing"] | State
 """Before the source is opened, live is preparing: it loads, and compiles where nothing is kept yet."""
@@ -21,7 +22,8 @@ class LiveStatus:
     """The last second. ``age_s`` is from the coming of a result's last frame until pages had drawn it (where none is
     open, until it was made), the median, ``oldest_s`` the largest, None where there was none.
 
-    ``phase_error_rows`` and ``clock_offset_ppm`` are None while nothing is followed; ``why`` says then why not.
+    ``phase_error_rows``, ``clock_offset_ppm`` and ``order``, how the lights' names are known, are None while nothing is
+    followed; ``why`` says then why not.
     ``compiling`` says how far that is, "" where nothing is compiled. ``waits_for`` says what is missing and what to do
     where nothing can be shown for long.
     ``width_px`` and ``height_px`` are the live picture's; ``off_rows`` is how far the dark row
@@ -39,6 +41,7 @@ class LiveStatus:
     oldest_s: float | None
     phase_error_rows: float | None
     clock_offset_ppm: float | None
+    order: Order | None
     width_px: int
     height_px: int
     why: str = ""
@@ -60,7 +63,8 @@ class LiveStatus:
         if self.state == "preparing":
             return self.compiling or SAID[self.state]
         comes = f"{self.fps:.1f} fps" if self.fps or not self.frames else "NO FRAMES COME"
-        parts = [SAID[self.state], *([self.compiling] if self.compiling else []), comes]
+        guessed = "NAMES OF LIGHTS ARE A GUESS" if self.order == "guess" else ""
+        parts = [SAID[self.state], *filter(None, (guessed, self.compiling)), comes]
         if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
             parts.append(f"+-{self.phase_error_rows:.2g} row, {self.clock_offset_ppm:+.1f} ppm")
         parts.append(f"{self.frames} frames, {self.lost} lost")

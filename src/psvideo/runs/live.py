@@ -17,7 +17,7 @@ from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.following.history import timing_of
 from psvideo.live.following.lock import check_followed
-from psvideo.live.incoming.recording import recorded_words, recording
+from psvideo.live.incoming.recording import FIRST_NUMBER, recorded_words, recording
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.incoming.sources import opened_source
 from psvideo.live.running import Running
@@ -77,7 +77,8 @@ def live(
       bytes hold, such as gray or gray16le.
     - ``rig``: where the lights are; without it there are plates and no normals.
     - ``rig_out``: a rig.toml to write when lights are found on a chrome ball, by a click on the page.
-    - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
+    - ``timing_out``: a timing.json to write at the end, of all that was followed, by the recording's name and numbers
+      where one was made; ``force`` replaces one.
     - ``record``: a clip folder to record the frames into, whole or not at all: of a run that is stopped (Ctrl-C) or
       ends in a fault, the frames until then.
     - ``lock``: play the plan on the board at the port ``strobe`` ("auto": by USB identity), and trim its period so that
@@ -111,7 +112,7 @@ def live(
         _check_rig(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
     running.prepare = lambda: rehearse(played, known, step=running.chain.step, page=page)
-    kept = _keeper(path_if_given("rig_out", rig_out), force=force)
+    keep = _keeper(path_if_given("rig_out", rig_out), force=force)
     record_path = path_if_given("record", record)
     plan_path = path_if_given("plan", plan) or played.plan_path
 
@@ -123,7 +124,8 @@ def live(
         held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller, logged=logged
     )
     with (
-        _page(running, played, known, caller, opened, kept, host, port, token) if page else nullcontext(),
+        _said_what_is_recorded(running, record_path, caller),
+        _page(running, played, known, caller, opened, keep, host, port, token) if page else nullcontext(),
         nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
         nullcontext() if lock is None else held(plan_path, lock=lock) as holding,
     ):
@@ -137,8 +139,25 @@ def live(
         whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
         raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
     if timing_path is not None:
-        write_text(timing_path, format_timing(_timing(running.chain, played)))
+        kept = (
+            played
+            if record_path is None
+            else replace(played, name=record_path.resolve().name, first_number=FIRST_NUMBER)
+        )
+        write_text(timing_path, format_timing(_timing(running.chain, kept)))
     return summary
+
+
+@contextmanager
+def _said_what_is_recorded(running: Running, path: Path | None, caller: Caller) -> Iterator[None]:
+    """Say what a recording holds where somebody stops the block that makes it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        record = running.recording
+        if path is not None and record is not None and record.written:
+            caller.warn(f"{recorded_words(path, record)} {record.ended}".rstrip())
+        raise
 
 
 def _check_rig(rig: Rig, source: LiveSource) -> None:
@@ -233,4 +252,4 @@ def _timing(chain: Chain, source: LiveSource) -> Timing:
             after = came_before.get(hole.before - 1, hole.before - 1)
             missing[after] = missing.get(after, 0) + hole.count
     dropped = [DroppedFrames(after=at + source.first_number, count=count) for at, count in sorted(missing.items())]
-    return timing_of(chain.followed, clip=source.name, dropped=dropped)
+    return timing_of(chain.followed, clip=source.name, dropped=dropped, first_light=chain.first_light)

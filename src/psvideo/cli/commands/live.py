@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice, print_json
+from psvideo.cli.ending import stoppable
 from psvideo.cli.options.clip_and_run import FirstLight, Force, PlanPath
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.strobe import Yes
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 STAYS_S = 10.0
 """Where lines are not written over, one comes this often as long as nothing changes."""
+STOPS = 2
+"""The first Ctrl-C is how a live run ends; a second one leaves out what still waits for the disk."""
 
 
 @spread
@@ -97,30 +100,31 @@ def live(
     if not source:
         raise UsageError("Name what to watch: a clip, a URL, a device; psvideo live --list shows what there is.")
     telling = _Telling(voice=voice)
-    summary = watch(
-        source,
-        plan=plan,
-        rig=rig,
-        rig_out=rig_out,
-        first_light=first_light,
-        timing_out=timing_out,
-        growing=growing,
-        raw=raw,
-        record=record,
-        lock=lock,
-        strobe=strobe,
-        yes=yes,
-        pace=pace,
-        seconds=seconds,
-        force=force,
-        page=not no_page,
-        host=host,
-        port=port,
-        token=token,
-        opened=lambda url: _open(voice, url, browser=not no_browser),
-        said=telling.say,
-        caller=voice.caller(),
-    )
+    with stoppable(stops=STOPS):
+        summary = watch(
+            source,
+            plan=plan,
+            rig=rig,
+            rig_out=rig_out,
+            first_light=first_light,
+            timing_out=timing_out,
+            growing=growing,
+            raw=raw,
+            record=record,
+            lock=lock,
+            strobe=strobe,
+            yes=yes,
+            pace=pace,
+            seconds=seconds,
+            force=force,
+            page=not no_page,
+            host=host,
+            port=port,
+            token=token,
+            opened=lambda url: _open(voice, url, browser=not no_browser),
+            said=telling.say,
+            caller=voice.caller(),
+        )
     if sys.stderr.isatty() and not (voice.json or voice.quiet):
         print(file=sys.stderr)
     telling.warn(summary.notes)

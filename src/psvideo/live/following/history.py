@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from psvideo.live.following.follow import Follower
+from psvideo.live.following.light_names import guess_words, order_of
 from psvideo.live.following.phase_filter import smoothed
 from psvideo.model.timing import DroppedFrames, Flash, Timing
 from psvideo.sync.flashes_seen import flashes_seen
@@ -22,10 +23,17 @@ def timing_now(follower: Follower, span: tuple[int, int]) -> Timing:
     return _timing(follower, flashes, beat, clip="live")
 
 
-def timing_of(followed: Sequence[Follower], *, clip: str, dropped: Sequence[DroppedFrames] = ()) -> Timing:
+def timing_of(
+    followed: Sequence[Follower],
+    *,
+    clip: str,
+    dropped: Sequence[DroppedFrames] = (),
+    first_light: str | None = None,
+) -> Timing:
     """Return the timing of all that was followed, one lock after the other; every moment by all that was measured.
 
-    Raises ValueError where nothing was.
+    ``first_light`` is what named the first lock's lights, where anybody did. Raises ValueError where nothing was
+    followed.
     """
     flashes: list[Flash] = []
     beat = followed[-1].beat
@@ -36,7 +44,12 @@ def timing_of(followed: Sequence[Follower], *, clip: str, dropped: Sequence[Drop
         seen = flashes_seen(one.plan, beat, one.lock.camera, one.span, trusted=one.span)
         flashes += [flash for flash in seen if not flashes or flash.start_s > flashes[-1].start_s + flash.duration_s]
     numbered = tuple(replace(flash, index=number) for number, flash in enumerate(flashes))
-    return replace(_timing(followed[-1], numbered, beat, clip=clip), dropped_frames=tuple(dropped))
+    return replace(
+        _timing(followed[-1], numbered, beat, clip=clip),
+        dropped_frames=tuple(dropped),
+        order=order_of(followed),
+        order_note=guess_words(followed, first_light=first_light),
+    )
 
 
 def _timing(follower: Follower, flashes: tuple[Flash, ...], beat: Beat, *, clip: str) -> Timing:

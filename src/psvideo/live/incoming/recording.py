@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.sequences.code_files import write_codes
 from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
-from psvideo.formats.whole_folders import unfinished_folder_of, whole_folder
+from psvideo.formats.whole_folders import forget_begun, unfinished_folder_of, whole_folder
 from psvideo.live.chain import LiveFrame
 from psvideo.live.incoming.source import LiveSource
 from psvideo.model.units import counted
@@ -28,6 +28,8 @@ from psvideo.strobe.runlog import LOG_NAME
 
 MOST_WAITING_BYTES = 256_000_000
 """Codes that may wait for the disk: more than a second of most cameras."""
+FIRST_NUMBER = 1
+"""What the first recorded frame's file is numbered."""
 
 
 @dataclass(kw_only=True)
@@ -75,13 +77,14 @@ class Recording:
                     return
                 index, codes = self._queue[0]
             try:
-                write_codes(self.folder / FRAMES / f"live.{index + 1:06d}.tif", codes)
+                write_codes(self.folder / FRAMES / f"live.{index + FIRST_NUMBER:06d}.tif", codes)
             except Exception as fault:  # whatever it is, nobody may wait for this thread, nor take it for whole
                 self._give_up(index, fault)
                 return
             with self._changed:
-                self._queue.popleft()
-                self._bytes -= codes.nbytes
+                if self._queue:  # nobody cut it meanwhile
+                    self._queue.popleft()
+                    self._bytes -= codes.nbytes
                 self.written += 1
                 self._changed.notify_all()
 
@@ -91,9 +94,19 @@ class Recording:
             self._over = True
             self._changed.notify_all()
 
+    def cut(self) -> None:
+        """End at once: what still waits for the disk is left out."""
+        with self._changed:
+            self._over = True
+            if len(self._queue) > 1:  # the first of them is being written
+                self.ended = "The run was stopped while more frames waited for the disk, which are not recorded."
+            self._queue.clear()
+            self._bytes = 0
+            self._changed.notify_all()
+
     def _give_up(self, index: int, fault: Exception) -> None:
         why = fault.strerror if isinstance(fault, OSError) else None
-        (self.folder / FRAMES / f"live.{index + 1:06d}.tif").unlink(missing_ok=True)
+        (self.folder / FRAMES / f"live.{index + FIRST_NUMBER:06d}.tif").unlink(missing_ok=True)
         with self._changed:
             self.ended = (
                 f"Recording ended after {self.written} frames, which are whole: the next could not be written "
@@ -118,30 +131,63 @@ def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Record
             "clip as it is, and record from a pipe whose bare bytes `raw` names, such as gray or gray16le."
         )
     _refuse_left(path, force=force)
-    failed: BaseException | None = None
-    with whole_folder(path, mark=PLAN_FILE, force=force) as folder:
-        (folder / FRAMES).mkdir(exist_ok=True)
-        log = source.plan_path.with_name(LOG_NAME)
-        shutil.copyfile(source.plan_path, folder / PLAN_FILE)
-        if log.is_file():
-            shutil.copyfile(log, folder / LOG_NAME)
-        record = Recording(folder=folder, waits=not source.paced)
-        writer = threading.Thread(target=record.write, name="psvideo record", daemon=True)
-        writer.start()
-        try:
-            yield record
-        except BaseException as fault:  # raised again below, when the folder is whole
-            failed = fault
-        record.over()
-        writer.join()
-        if record.log:
-            (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
-        if not record.written:
-            raise failed or PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())
+    failed, record = None, None
+    try:
+        with whole_folder(path, mark=PLAN_FILE, force=force) as folder:
+            _lay_out(folder, source.plan_path)
+            record = Recording(folder=folder, waits=not source.paced)
+            writer = threading.Thread(target=record.write, name="psvideo record", daemon=True)
+            writer.start()
+            try:
+                yield record
+            except BaseException as fault:  # raised again below, when the folder is whole
+                failed = fault
+            failed = _ended(record, writer, failed)
+            if not record.written:
+                raise failed or PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())
+            _write_log(folder, record)
+    except BaseException:
+        if record is not None and not record.written:
+            forget_begun(path)
+        raise
     if isinstance(failed, PsvideoError):
         raise type(failed)(f"{failed} {recorded_words(path, record)}") from failed
     if failed is not None:
         raise failed
+
+
+def _lay_out(folder: Path, plan_path: Path) -> None:
+    """Put into a clip's folder what lies beside its frames: the plan, and the log beside it."""
+    (folder / FRAMES).mkdir(exist_ok=True)
+    shutil.copyfile(plan_path, folder / PLAN_FILE)
+    log = plan_path.with_name(LOG_NAME)
+    if log.is_file():
+        shutil.copyfile(log, folder / LOG_NAME)
+
+
+def _ended(record: Recording, writer: threading.Thread, failed: BaseException | None) -> BaseException | None:
+    """Wait until what was taken is written, or cut it short where somebody stops that; return what is to be raised."""
+    if isinstance(failed, KeyboardInterrupt):
+        record.cut()
+    record.over()
+    try:
+        writer.join()
+    except KeyboardInterrupt as stop:
+        record.cut()
+        writer.join()
+        return stop
+    return failed
+
+
+def _write_log(folder: Path, record: Recording) -> None:
+    """Write what the strobe played, where it played: a disk that is full costs the log, and not the recording."""
+    if not record.log:
+        return
+    try:
+        (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
+    except OSError as fault:
+        (folder / LOG_NAME).unlink(missing_ok=True)
+        record.ended = f"{record.ended} {LOG_NAME} could not be written ({fault.strerror}).".strip()
 
 
 def recorded_words(path: Path, record: Recording) -> str:
