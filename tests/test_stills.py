@@ -701,6 +701,29 @@ def test_a_list_that_names_other_pictures_and_counts_otherwise_is_refused(tmp_pa
         assert "by order" in found.how
 
 
+def test_lights_of_which_there_is_no_picture_are_left_out_and_named(tmp_path: Path) -> None:
+    """Six photographs of a dome of 96: nobody takes ninety lines out by hand."""
+    kept = [0, 1, 3, 5]
+    folder = photographs(tmp_path / "photos", [lit()[n] for n in kept], [NAMES[n] for n in kept])
+    turned = [3, 0, 5, 1, 4, 2]
+    lights = listed(tmp_path / "lights.lp", [f"{NAMES[n]}.jpg" for n in turned], LIGHTS[turned])
+    report = ps.stills(folder, lights=lights, out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1
+    assert "2 of the 6 lights are left out, as no picture bears the name: shot 21.jpg, shot 8.jpg of" in remarks(report)
+    assert {light.name for light in ps.read_rig(tmp_path / "out" / "setup" / "rig.toml").lights} == {
+        NAMES[n] for n in kept
+    }
+
+
+def test_pictures_that_bear_a_rigs_lights_need_not_be_all(tmp_path: Path) -> None:
+    folder = named_pictures(tmp_path / "photos", ("vase_key.png", "vase_top.png", "vase_left.png"))
+    found = pair_stills(folder, ("key", "left", "rim", "top"), named=True, whose="rig.toml")
+    assert (found.names, found.places) == (("key", "left", "top"), (0, 1, 3))
+    with pytest.raises(PsvideoError, match=r"Pictures without a light: vase_top2.png"):
+        (tmp_path / "photos" / "vase_top.png").rename(tmp_path / "photos" / "vase_top2.png")
+        pair_stills(folder, ("key", "left", "rim", "top"), named=True, whose="rig.toml")
+
+
 def test_a_name_that_begins_two_pictures_is_asked_about(tmp_path: Path) -> None:
     folder = named_pictures(tmp_path / "photos", ("a_1.jpg", "a_1_b.jpg", "a_2_b.jpg", "a_3_b.jpg"))
     found = pair_stills(folder, ("a_1", "a_2_b", "a_3_b"), named=True, whose="lights.lp")

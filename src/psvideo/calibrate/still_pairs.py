@@ -28,8 +28,8 @@ class Pairs:
     """Photographs in the order of their lights.
 
     files: one for each light. names: the lights', from the rig, or the files' own where the list has none.
-    places: of the lights in the list. how: by what they were paired, a sentence. dark: shows ambient light alone.
-    mask: white where to solve, found beside them. aside: pictures that belong to no light.
+    places: of the lights in the list, which may name more. how: by what they were paired, in sentences. dark: shows
+    ambient light alone. mask: white where to solve, found beside them. aside: pictures that belong to no light.
     """
 
     files: tuple[Path, ...]
@@ -53,8 +53,8 @@ def pair_stills(
 ) -> Pairs:
     """Return which picture of a folder shows which light.
 
-    ``known`` are the lights in order; where they are ``named`` (as pictures or as lights), by name if all are there;
-    else by order. ``whose`` is what messages call the list. With ``keep_names`` lights keep the names in ``known``,
+    ``known`` are the lights in order; where they are ``named`` (as pictures or as lights), by name if all are there,
+    or if every picture is, so that lights are left over alone; else by order. ``whose`` is what messages call the list. With ``keep_names`` lights keep the names in ``known``,
     else they get their pictures' own. ``dark`` and ``mask`` show no light,
     wherever they lie. Raises PsvideoError where names or counts do not fit.
     """
@@ -68,10 +68,13 @@ def pair_stills(
     masks = [file for file in found.left_aside if any(bears(file, name) for name in MASK_NAMES)]
     dark, mask = dark or (found.ambient[0] if found.ambient else None), mask or (masks[0] if masks else None)
     matches = _matches(known, files) if named else []
-    if matches and all(len(one) == 1 for one in matches):
-        chosen = [one[0] for one in matches]
-        _refuse_named_twice(known, chosen, whose)
-        how = f"Pictures belong to lights by name ({whose}): {_shown(known, chosen)}."
+    places = tuple(range(len(known)))
+    if matches and (all(len(one) == 1 for one in matches) or _all_found(matches, files)):
+        places = tuple(place for place in places if matches[place])
+        chosen = [matches[place][0] for place in places]
+        lights = [known[place] for place in places]
+        _refuse_named_twice(lights, chosen, whose)
+        how = f"Pictures belong to lights by name ({whose}): {_shown(lights, chosen)}.{_left_over(known, places, whose)}"
     elif any(matches):
         raise PsvideoError(_misnamed(folder, known, matches, files, whose))
     else:
@@ -85,8 +88,7 @@ def pair_stills(
     aside = [
         file for file in (*files, *found.left_aside) if file not in (*chosen, *masks) and file.resolve() not in apart
     ]
-    names = tuple(known) if keep_names else _own_names(chosen)
-    places = tuple(range(len(known)))
+    names = tuple(known[place] for place in places) if keep_names else _own_names(chosen)
     return Pairs(files=tuple(chosen), names=names, places=places, how=how, dark=dark, mask=mask, aside=tuple(aside))
 
 
@@ -139,11 +141,30 @@ def _refuse_named_twice(known: Sequence[str], chosen: Sequence[Path], whose: str
 
 
 def _matches(names: Sequence[str], files: Sequence[Path]) -> list[list[Path]]:
-    """Return for every name of a list the files that it may mean: in the first way in which each means one, else what
-    their whole names say."""
+    """Return for every name of a list the files that it may mean: in the first way in which each means one, else in the
+    first in which every file is meant once, else what their whole names say."""
     ways = (_by_whole_name, _by_number, _by_beginning)
     found = [[way(_stem_of(name), files) for name in names] for way in ways]
-    return next((one for one in found if all(len(each) == 1 for each in one)), found[0])
+    exact = (one for one in found if all(len(each) == 1 for each in one))
+    fewer = (one for one in found if _all_found(one, files))
+    return next(exact, None) or next(fewer, found[0])
+
+
+def _all_found(matches: Sequence[Sequence[Path]], files: Sequence[Path]) -> bool:
+    """Return whether every picture is meant by one name, and no name means several: only lights are left over."""
+    return sorted(file for one in matches for file in one) == sorted(files) and all(len(one) < 2 for one in matches)
+
+
+def _left_over(known: Sequence[str], places: Sequence[int], whose: str) -> str:
+    """Return a sentence on the lights of a list of which there is no picture, nothing where there is none."""
+    without = [name for place, name in enumerate(known) if place not in places]
+    if not without:
+        return ""
+    what = "light is" if len(without) == 1 else "lights are"
+    return (
+        f" {len(without)} of the {len(known)} {what} left out, as no picture bears the name: "
+        f"{listed(without, LISTED)} of {whose}."
+    )
 
 
 def _stem_of(name: str) -> str:

@@ -48,7 +48,7 @@ def still_clip(
     files = (*pairs.files, *([pairs.dark] if pairs.dark else []))
     pictures = look_at(files, transfer=transfer)
     _check_size(folder, pictures, known)
-    rig = known.in_order(pairs.names)
+    rig = known.at(pairs.places, pairs.names)
     glance = glance_at(pictures, rig.lights)
     exposures, note, warning = exposures_of(glance, pictures, len(pairs.files))
     if exposures is not None:

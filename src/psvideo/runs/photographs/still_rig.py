@@ -43,9 +43,11 @@ class KnownLights:
         """Whether there is anything to pair by."""
         return len(self.called) == len(self.rig.lights)
 
-    def in_order(self, names: Sequence[str]) -> Rig:
-        """Return the rig with other names, in the same order."""
-        lights = tuple(replace(light, name=name) for light, name in zip(self.rig.lights, names, strict=True))
+    def at(self, places: Sequence[int], names: Sequence[str]) -> Rig:
+        """Return the rig of the lights at these places, under these names."""
+        lights = tuple(
+            replace(self.rig.lights[place], name=name) for place, name in zip(places, names, strict=True)
+        )
         return replace(self.rig, lights=lights)
 
 
