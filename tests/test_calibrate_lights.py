@@ -268,6 +268,30 @@ def test_a_rig_gets_a_name_under_which_it_can_be_read(
     assert not path.exists()
 
 
+@pytest.mark.parametrize(
+    ("circle", "status", "says"),
+    [
+        ("95.3,71.8,63", 0, "lies 3 pixels from the outline that the pictures show, 95,72,60"),
+        ("101,71.8,60", 0, "lies 6 pixels from the outline that the pictures show, 95,72,60"),
+        ("110,71.8,60", 1, "lies 15 pixels from the outline that the pictures show, 95,72,60"),
+    ],
+)
+def test_a_circle_beside_the_ball_is_named_and_not_believed(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str], circle: str, status: int, says: str
+) -> None:
+    rig = shot[0].with_name("rig.toml")
+    assert main(["calibrate", "matte-sphere", str(shot[0]), "-o", str(rig), "--circle", circle]) == status
+    said = capsys.readouterr().err
+    assert says in said
+    assert "no matte sphere of one colour" not in said
+    if status == 0:
+        known = {light.name: light.direction for light in read_rig(shot[1]).lights}
+        for light in read_rig(rig).lights:
+            assert light.direction is not None
+            off = off_deg(np.array(light.direction), np.array(known[light.name]))
+            assert off < 3 * (light.error_deg or 0)
+
+
 def test_a_calibration_that_failed_is_repeated_without_force(
     shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

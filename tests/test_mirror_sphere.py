@@ -24,6 +24,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import parse_rig, read_rig
 from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
 from psvideo.runs.photographs.light_sets import open_light_sets
+from psvideo.runs.steps.caller import Caller
 
 DIRECTIONS = {"key": (0.3, 0.4, 0.87), "left": (-0.5, 0.2, 0.84), "low": (0.1, -0.4, 0.9), "rim": (0.7, 0.3, 0.4)}
 DISTANT = {name: Lamp(direction=vector) for name, vector in DIRECTIONS.items()}
@@ -225,6 +226,54 @@ def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(
         inside[name] = -np.median(away)
     assert 0 < inside["found"] < 1.5
     assert inside["supplied"] < -1.0, "the supplied circle lies inside the dark ball"
+
+
+@pytest.mark.parametrize("wrong", [(0, 44, 0), (0, 0, -40), (130, 130, -130)])
+def test_a_circle_that_the_picture_contradicts_is_named_and_costs_its_error(
+    psbox: Path, tmp_path: Path, wrong: tuple[float, float, float]
+) -> None:
+    """The psbox picture is 1000 rows high: 44 pixels lower is where a circle counted from the bottom would lie."""
+    said: list[str] = []
+    x, y, radius = (one + off for one, off in zip(PSBOX_CIRCLE, wrong, strict=True))
+    out = tmp_path / "rig.toml"
+    found = mirror_sphere([psbox], out=out, circle=[(x, y, radius)], caller=Caller(warn=said.append))
+    errors, own = _errors_of_named(psbox, found)
+    assert any(f"the `circle` {x:.0f},{y:.0f},{radius:.0f} lies" in one for one in said)
+    assert errors.mean() > 1.5
+    assert (errors < 2.5 * own).all()
+
+
+def _errors_of_named(psbox: Path, found: MirrorCalibration) -> tuple[np.ndarray, np.ndarray]:
+    truth = np.loadtxt(psbox / "light_directions.txt").T
+    pairs = [(light, vector) for light, vector in zip(found.lights, truth, strict=True) if not light.fault]
+    errors = [angle_deg(light.direction, vector) for light, vector in pairs]
+    return np.array(errors), np.array([light.error_deg for light, _ in pairs])
+
+
+def test_circles_that_people_marked_well_are_believed_and_nothing_is_said(
+    psbox: Path, shared_data: Path, tmp_path: Path
+) -> None:
+    """The authors' own circles, counted from the bottom left, from 1."""
+    said: list[str] = []
+    mirror_sphere([psbox], out=tmp_path / "psbox.toml", circle=[PSBOX_CIRCLE], caller=Caller(warn=said.append))
+    for name in ("frog/LightProbe-1", "hippo/LightProbe-2", "cat/LightProbe-2"):
+        folder = shared_data / "harvard_ps" / name
+        x, y, radius = np.loadtxt(folder / "circle_data.txt")
+        high = read_picture(folder / "ref.JPG").shape[0]
+        out = tmp_path / f"{name[:3]}.toml"
+        mirror_sphere([folder], out=out, circle=[(x - 1, high - y, radius)], caller=Caller(warn=said.append))
+    assert not [one for one in said if "`circle`" in one]
+
+
+def test_a_ball_beside_the_circle_is_named_unless_it_has_a_circle_of_its_own() -> None:
+    """Two balls, one of them lost in its background: that is what circles are for."""
+    lens = Lens(width=500, height=260, focal=900.0)
+    pictures = shoot(lens, [Ball(centre=(-0.06, 0.0, -0.5))], DISTANT)
+    seen, lost = (141.5, 129.5, 90.0), (400.0, 129.5, 60.0)
+    alone = sight_spheres([pictures], Looking(focal_px=900.0, circles=(lost,)), where="ball")
+    assert "no round outline shows at the `circle` 399,130,59, but one at 142,130,90" in alone[0].doubt
+    both = sight_spheres([pictures], Looking(focal_px=900.0, circles=(lost, seen)), where="ball")
+    assert [one.doubt for one in both] == ["", ""]
 
 
 def test_the_chrome_sphere_of_washington(shared_data: Path, tmp_path: Path) -> None:

@@ -159,10 +159,11 @@ def _light(name: str, n: int, sphere: _Sphere, moved: list[_Sphere]) -> MatteLig
             name=name, direction=direction, error_deg=180.0, intensity=intensity, intensity_error=1.0, left=left,
             used=used, fault=fault,
         )  # fmt: skip
-    covariance = _covariance(sphere, n, moved, lit, total)
+    by_parts, by_outline = _covariances(sphere, n, moved, lit, total)
+    covariance = by_parts + by_outline
     length = float(np.linalg.norm(total))
-    across = np.eye(3) - np.outer(direction, direction)
-    error_deg = float(np.degrees(np.sqrt(np.trace(across @ covariance @ across)) / length))
+    error_deg = _turned_deg(covariance, direction, length)
+    contradicts = _turned_deg(by_parts, direction, length) > MOST_ERROR_DEG
     return MatteLight(
         name=name,
         direction=direction,
@@ -171,25 +172,34 @@ def _light(name: str, n: int, sphere: _Sphere, moved: list[_Sphere]) -> MatteLig
         intensity_error=float(np.sqrt(direction @ covariance @ direction) / length),
         left=left,
         used=used,
-        fault=_CONTRADICTS if error_deg > MOST_ERROR_DEG else "",
+        fault="" if error_deg <= MOST_ERROR_DEG else _CONTRADICTS if contradicts else _OUTLINE_UNSURE,
     )
 
 
-def _covariance(sphere: _Sphere, n: int, moved: list[_Sphere], lit: NDArray[np.bool_], total: FloatArray) -> FloatArray:
+def _turned_deg(covariance: FloatArray, direction: FloatArray, length: float) -> float:
+    """Return the root mean square angle by which a vector of this direction and length is turned."""
+    across = np.eye(3) - np.outer(direction, direction)
+    return float(np.degrees(np.sqrt(np.trace(across @ covariance @ across)) / length))
+
+
+def _covariances(
+    sphere: _Sphere, n: int, moved: list[_Sphere], lit: NDArray[np.bool_], total: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return the covariance (3, 3) of a light's direction times its intensity, ``total``: how it changes as patches are
-    left out one by one, as only what is well lit counts, and as the outline is moved by its own error."""
+    left out one by one and as only what is well lit counts; and as the outline is moved by its own error."""
     everything = np.ones(len(sphere.normals), np.bool_)
     patches = [patch for patch in np.unique(sphere.patch) if (lit & (sphere.patch == patch)).sum() >= FEWEST_OF_A_PATCH]
     without = [_fitted(sphere, n, sphere.patch != patch)[0].sum(axis=0) for patch in patches]
-    off = [_fitted(sphere, n, everything, least_cosine=STEEPER_COSINE)[0].sum(axis=0)]
-    off += [_fitted(one, n, np.ones(len(one.normals), np.bool_))[0].sum(axis=0) for one in moved]
+    well_lit = _fitted(sphere, n, everything, least_cosine=STEEPER_COSINE)[0].sum(axis=0)
+    off = [_fitted(one, n, np.ones(len(one.normals), np.bool_))[0].sum(axis=0) for one in moved]
     count = max(len(patches), 1)
     spread = np.array([one - total for one in without])
-    covariance: FloatArray
-    covariance = (count - 1) / count * spread.T @ spread + sum(np.outer(one - total, one - total) for one in off)
-    return covariance
+    by_parts: FloatArray = (count - 1) / count * spread.T @ spread + np.outer(well_lit - total, well_lit - total)
+    by_outline: FloatArray = np.sum([np.outer(one - total, one - total) for one in off], axis=0)
+    return by_parts, by_outline
 
 
+_OUTLINE_UNSURE = "where the sphere's outline is, is not known well enough to say where the light is"
 _CONTRADICTS = "its parts contradict each other: what is inside the outline is no matte sphere of one colour"
 
 

@@ -53,10 +53,10 @@ def pair_stills(
 ) -> Pairs:
     """Return which picture of a folder shows which light.
 
-    ``known`` are the lights in order; where they are ``named`` (as pictures or as lights), by name if all are there,
-    or if every picture is, so that lights are left over alone; else by order. ``whose`` is what messages call the list. With ``keep_names`` lights keep the names in ``known``,
-    else they get their pictures' own. ``dark`` and ``mask`` show no light,
-    wherever they lie. Raises PsvideoError where names or counts do not fit.
+    ``known`` are the lights in order; where they are ``named`` (as pictures or as lights), by name if all are there
+    or every picture is one of them, so that lights alone are left over; else by order. ``whose`` is what messages call
+    the list. With ``keep_names`` lights keep the names in ``known``, else they get their pictures' own. ``dark`` and
+    ``mask`` show no light, wherever they lie. Raises PsvideoError where names or counts do not fit.
     """
     if not folder.is_dir():
         raise PsvideoError(f"{folder}: is no folder. Name the folder that holds the photographs, one per light.")
@@ -74,7 +74,9 @@ def pair_stills(
         chosen = [matches[place][0] for place in places]
         lights = [known[place] for place in places]
         _refuse_named_twice(lights, chosen, whose)
-        how = f"Pictures belong to lights by name ({whose}): {_shown(lights, chosen)}.{_left_over(known, places, whose)}"
+        how = (
+            f"Pictures belong to lights by name ({whose}): {_shown(lights, chosen)}.{_left_over(known, places, whose)}"
+        )
     elif any(matches):
         raise PsvideoError(_misnamed(folder, known, matches, files, whose))
     else:

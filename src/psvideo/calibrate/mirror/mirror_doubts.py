@@ -50,6 +50,8 @@ def _about_spheres(sightings: Sequence[Sighting]) -> list[str]:
     said = []
     for sighting in sightings:
         outline = sighting.outline
+        if sighting.doubt:
+            said.append(f"{sighting.where}: {sighting.doubt}")
         if outline.radius_px < SMALL_RADIUS_PX:
             said.append(
                 f"{sighting.where}: the sphere's radius is {outline.radius_px:.0f} pixels; below {SMALL_RADIUS_PX:.0f} "

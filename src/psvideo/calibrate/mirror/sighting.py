@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
 from psvideo.calibrate.mirror.spots import Spot
+from psvideo.calibrate.sphere.marked import held_against_picture
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
 from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import Looking
@@ -51,7 +52,8 @@ class Highlight:
 class Sighting:
     """A sphere at one place. ``picture`` (row, col), linear, is the brightest of all lights, for showing it.
 
-    ``moved_px`` is how far the outline moved between sets, root mean square.
+    ``moved_px`` is how far the outline moved between sets, root mean square; ``doubt`` what the pictures say against an
+    outline that was marked by hand.
     """
 
     where: str
@@ -60,6 +62,7 @@ class Sighting:
     picture: Grey
     sets: int
     moved_px: float = 0.0
+    doubt: str = ""
 
 
 def sight_spheres(
@@ -71,6 +74,7 @@ def sight_spheres(
     SphereNotFoundError where fewer spheres than expected are found, or one is cut by the frame.
     """
     outlines: list[Outline] = []
+    doubts: list[str] = []
     fits: list[list[FloatArray]] = []
     found: list[list[list[FoundHighlight]]] = []
     shown: Grey | None = None
@@ -78,7 +82,7 @@ def sight_spheres(
         brightest = pictures.grey.max(axis=0)
         if shown is None:
             shown = brightest
-            outlines = _first_outlines(pictures, looking, where, room)
+            outlines, doubts = _first_outlines(pictures, looking, where, room)
             fits, found = [[] for _ in outlines], [[] for _ in outlines]
         for n, outline in enumerate(outlines):
             fits[n].append(outline.place if outline.given or count == 1 else follow_outline(pictures, outline))
@@ -86,8 +90,8 @@ def sight_spheres(
     if shown is None:
         raise PsvideoError(f"{where}: holds no pictures of lights. Name a folder of stills or plates, or a clip.")
     return [
-        _sighting(_where(where, n, len(outlines)), outline, np.array(places), seen, shown)
-        for n, (outline, places, seen) in enumerate(zip(outlines, fits, found, strict=True))
+        replace(_sighting(_where(where, n, len(outlines)), outline, np.array(places), seen, shown), doubt=doubt)
+        for n, (outline, doubt, places, seen) in enumerate(zip(outlines, doubts, fits, found, strict=True))
     ]
 
 
@@ -97,24 +101,30 @@ def _where(where: str, n: int, count: int) -> str:
 
 def _first_outlines(
     pictures: LightPictures, looking: Looking, where: str, room: NDArray[np.float32] | None
-) -> list[Outline]:
+) -> tuple[list[Outline], list[str]]:
+    """Return the outlines from left to right, and what the pictures say against each that was marked by hand."""
     view = looking.view(width_px=pictures.width_px, height_px=pictures.height_px)
     shown = pictures.grey.max(axis=0)
+    bright = room.mean(axis=2, dtype=np.float32) if room is not None and room.ndim == 3 else room
+    fits = bright is not None and bright.shape == shown.shape
     if looking.circles:
         outlines = [given_outline(view, circle) for circle in looking.circles]
     else:
-        if room is not None and room.shape[:2] != shown.shape:
+        if bright is not None and not fits:
             raise UsageError(
-                f"{where}: the picture for the outline is {room.shape[1]} x {room.shape[0]} pixels, and those of "
+                f"{where}: the picture for the outline is {bright.shape[1]} x {bright.shape[0]} pixels, and those of "
                 f"the lights are {shown.shape[1]} x {shown.shape[0]}. Take both with the same camera and mode."
             )
-        bright = room.mean(axis=2, dtype=np.float32) if room is not None and room.ndim == 3 else room
         outlines = find_outlines(pictures, view, count=looking.spheres, room=bright)
     if len(outlines) < max(looking.spheres, 1) and not looking.circles:
         raise SphereNotFoundError(_not_found(where, len(outlines), looking.spheres), shown)
     for outline in outlines:
         _refuse_cut(outline, where, shown)
-    return sorted(outlines, key=lambda outline: float(outline.place[0]))
+    outlines.sort(key=lambda outline: float(outline.place[0]))
+    if not looking.circles:
+        return outlines, ["" for _ in outlines]
+    held = [held_against_picture(pictures, one, room=bright if fits else None, others=outlines) for one in outlines]
+    return [outline for outline, _ in held], [doubt for _, doubt in held]
 
 
 def _not_found(where: str, found: int, wanted: int) -> str:

@@ -101,16 +101,39 @@ def find_outlines(
     ``room`` (row, col) is a picture of the same scene under room light.
     """
     shown = rim_pictures(pictures, room)
-    lit = pictures.grey
-    seen = [lit.mean(axis=0), lit.max(axis=0), *shown[min(len(lit), MOST_PICTURES) :]]
+    seen = _telling(pictures, shown)
     guesses = sorted(_guesses(seen, view, surface), key=lambda guess: guess.evidence, reverse=True)
     chosen: list[Rim] = []
     for guess in guesses:
-        if len(chosen) < count and all(_apart(guess, other) for other in chosen):
+        if len(chosen) < count and all(apart(guess.place, other.place) for other in chosen):
             best = _bettered(guess, seen, view, surface)
             fit = fit_rim(shown, view, best.place, surface=surface)
             chosen += [fit] if fit is not None and _sure(fit) else []
     return [_outline(view, fit) for fit in chosen]
+
+
+def outline_near(
+    pictures: LightPictures,
+    view: SphereView,
+    place: FloatArray,
+    *,
+    room: Grey | None = None,
+    surface: Surface = "mirror",
+) -> Outline | None:
+    """Return the outline within about a tenth of its radius of an expected one (5,); None where none is sure.
+
+    ``room`` as for ``find_outlines``.
+    """
+    shown = rim_pictures(pictures, room)
+    guess = seek_rim(_telling(pictures, shown), view, place, surface=surface)
+    fit = None if guess is None else fit_rim(shown, view, guess.place, surface=surface)
+    return _outline(view, fit) if fit is not None and _sure(fit) else None
+
+
+def _telling(pictures: LightPictures, shown: list[Grey]) -> list[Grey]:
+    """Return the pictures in which an outline is looked for first, of those in which a rim may show."""
+    lit = pictures.grey
+    return [lit.mean(axis=0), lit.max(axis=0), *shown[min(len(lit), MOST_PICTURES) :]]
 
 
 def follow_outline(pictures: LightPictures, outline: Outline) -> FloatArray:
@@ -164,6 +187,6 @@ def _outline(view: SphereView, fit: Rim) -> Outline:
     )
 
 
-def _apart(one: RoughOutline, other: Rim) -> bool:
-    away = float(np.hypot(*(one.place[:2] - other.place[:2])))
-    return away > 0.8 * float(one.place[2] + other.place[2])
+def apart(one: FloatArray, other: FloatArray) -> bool:
+    """Return whether two outlines (5,) are those of two things."""
+    return float(np.hypot(*(one[:2] - other[:2]))) > 0.8 * float(one[2] + other[2])

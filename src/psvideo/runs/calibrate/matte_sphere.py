@@ -5,6 +5,7 @@ from pathlib import Path
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.matte import MatteLight, matte_rig, measure_matte_sphere
+from psvideo.calibrate.sphere.marked import held_against_picture
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, given_outline
 from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.compute.progress import Watch, unwatched
@@ -60,14 +61,20 @@ def matte_sphere(
     reading = reading_of(plan, frames, first_light, transfer)
     found = pictures_of(Path(pictures), reading, watch=watch, caller=caller)
     view = Looking(focal_px=focal_px).view(width_px=found.width_px, height_px=found.height_px)
-    outline = _found(Path(pictures), found, view) if circle is None else given_outline(view, circle)
+    outline, doubt = (
+        (_found(Path(pictures), found, view), "")
+        if circle is None
+        else held_against_picture(found, given_outline(view, circle), surface="matte")
+    )
     lights = measure_matte_sphere(found, outline, albedo=albedo)
     rig = matte_rig(lights, view)
     write_png(picture, matte_picture(found, outline, lights))
     if not rig.lights:
-        faults = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
+        faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
         raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {picture}.")
     write_text(rig_path, format_rig(rig))
+    if doubt:
+        caller.warn(f"{pictures}: {doubt}")
     for light in lights:
         if light.fault:
             caller.warn(f"light {light.name!r} is left out of the rig: {light.fault}")

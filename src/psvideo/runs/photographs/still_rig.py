@@ -45,9 +45,7 @@ class KnownLights:
 
     def at(self, places: Sequence[int], names: Sequence[str]) -> Rig:
         """Return the rig of the lights at these places, under these names."""
-        lights = tuple(
-            replace(self.rig.lights[place], name=name) for place, name in zip(places, names, strict=True)
-        )
+        lights = tuple(replace(self.rig.lights[place], name=name) for place, name in zip(places, names, strict=True))
         return replace(self.rig, lights=lights)
 
 
