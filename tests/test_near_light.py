@@ -27,6 +27,7 @@ from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.loops.near_kernel import place_lights
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Floats, Near
 from psvideo.solve.normals.trust.near_spread import near_spread
@@ -514,3 +515,23 @@ def test_distances_do_not_hang_on_the_unit_of_the_lamps_strengths(scale: float) 
     best = RATIOS[np.argmin(costs.mean(axis=1))]
     assert best == pytest.approx(2.2 / 1.5, rel=0.05)
     assert costs.mean(axis=1).max() > 10 * costs.mean(axis=1).min(), "other distances do not explain it"
+
+
+def test_the_error_of_a_far_wall_does_not_hang_on_what_stands_in_the_middle_of_the_picture() -> None:
+    """What lights and lenses are off by is a share of the light that a place gets: as shares of albedo, whose unit is
+    the middle's light, residuals of a dim wall claimed what they would of a bright one."""
+    rig, far = ring_rig(6, 2), np.full((SIZE, SIZE), 1.8 * FAR_M, np.float32)
+    before = far.copy()
+    before[SIZE // 3 : -SIZE // 3, SIZE // 3 : -SIZE // 3] = 0.7 * FAR_M
+    v, u = np.mgrid[:SIZE, :SIZE].astype(float)
+    noise = PlateNoise(read=1e-8, photon=0.0)
+
+    def claimed_deg(depth_m: NDArray[np.float32]) -> float:
+        points = far.astype(float)[..., None] * rays(u, v)
+        plates = filmed(rig, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
+        ground = ground_of(rig, height_px=SIZE, width_px=SIZE).with_depth(depth_m)
+        found = huber1981.solve(plates, illumination(rig.lights, channels=1, ground=ground), plate_noise=noise)
+        assert found.error_deg is not None
+        return float(np.median(found.error_deg[: SIZE // 4]))
+
+    assert claimed_deg(before) == pytest.approx(claimed_deg(far), rel=0.02)

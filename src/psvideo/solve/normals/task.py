@@ -111,6 +111,7 @@ class Weights(NamedTuple):
     tukey: bool
     width: np.float32
     noise: np.float32
+    least: np.float32  # the same where residuals predict errors
     signal_noise: np.float32
     darkest: np.float32
     brightest: np.float32

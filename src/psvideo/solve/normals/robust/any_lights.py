@@ -5,7 +5,19 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.robust.equations import FROM, HALF, LOWER, OUT, RANK, SCALE, TO, UPPER, add_equations, halve
+from psvideo.solve.normals.robust.equations import (
+    FROM,
+    HALF,
+    LOWER,
+    OUT,
+    RANK,
+    SCALE,
+    SENT,
+    TO,
+    UPPER,
+    add_equations,
+    halve,
+)
 from psvideo.solve.normals.robust.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN, median_few
 from psvideo.solve.normals.task import FEW, Floats, Task, Weights
 
@@ -70,6 +82,8 @@ def find_scale(
 ) -> None:
     """Absolute residuals, and in SCALE their median as a standard deviation, at least a camera's noise.
 
+    ``share`` is of the light that reaches the pixel: what near lamps send far away is as exact as elsewhere.
+
     Three of the residuals may be 0 because three unknowns were fitted: the median is that of the others.
     """
     for i in range(n):
@@ -90,7 +104,7 @@ def find_scale(
         halve(v, e, n)
     for i in range(n):
         length = np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
-        least = noise + share * length
+        least = noise + share * length * v[SENT + i]
         v[SCALE + i] = max(SIGMA_OF_MEDIAN * HALF * (v[FROM + i] + v[TO + i]), least)
 
 

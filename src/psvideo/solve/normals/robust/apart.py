@@ -7,7 +7,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
-from psvideo.solve.normals.robust.equations import OUT
+from psvideo.solve.normals.robust.equations import OUT, PLANES_OF_V, SENT
 from psvideo.solve.normals.robust.reflecting import KEPT, OF_LIGHT
 from psvideo.solve.normals.task import Floats, Indices, Task
 
@@ -36,7 +36,7 @@ def memory_for_block(task: Task, *, reflecting: bool) -> Room:
     modelled = lights if reflecting else 0
     return Room(
         planes=np.zeros(PLANES * BLOCK, np.float32),
-        more=np.zeros(9 * BLOCK, np.float32),
+        more=np.ones(PLANES_OF_V * BLOCK, np.float32),
         values=values,
         measurements=values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32),
         errors=np.full((lights, BLOCK), OUT, np.float32),
@@ -54,6 +54,8 @@ def put_side_by_side(block: Room, listed: Indices, count: int, distant: bool, ap
     for plane in (X, Y, Z, COUNT, LIMIT):
         for k in range(count):
             apart.planes[plane + waiting + k] = block.planes[plane + listed[k]]
+    if not distant:
+        _pick(block.more[SENT:], listed, count, apart.more[SENT + waiting :])
     for light in range(len(block.measurements)):
         _pick(block.measurements[light], listed, count, apart.measurements[light, waiting:])
     for plane in range(len(block.values)):

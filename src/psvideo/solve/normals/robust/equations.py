@@ -33,8 +33,10 @@ HALF = np.float32(0.5)
 HALVINGS = 6  # a quantile is found to a 64th of the interval that holds it
 OUT = np.float32(1e30)  # beyond every interval: stands for what is MISSING
 
-# Planes of v: an interval (FROM, TO) around the value of that RANK; what the steps hand on; COUNTED is scratch.
-FROM, TO, RANK, COUNTED, LOWER, UPPER, SCALE, ODD, DOUBT = (BLOCK * plane for plane in range(9))
+# Planes of v: an interval (FROM, TO) around the value of that RANK; what the steps hand on; COUNTED is scratch; SENT is
+# what lights send to a pixel in the mean, over what they send to the middle of the picture (distant ones: 1).
+FROM, TO, RANK, COUNTED, LOWER, UPPER, SCALE, ODD, DOUBT, SENT = (BLOCK * plane for plane in range(10))
+PLANES_OF_V = 10
 RIGHT_X, RIGHT_Y, RIGHT_Z = LOW, HIGH, SUM  # the equations' right sides, in planes of w that are free by now
 
 
@@ -85,6 +87,16 @@ def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool
         w[X + i] = w[X + i] if kept else x * scale
         w[Y + i] = w[Y + i] if kept else y * scale
         w[Z + i] = w[Z + i] if kept else z * scale
+
+
+@FUSED.called
+def fill_sent(per_strength: Floats, lights: int, v: Floats, n: int) -> None:
+    """SENT of a block's pixels under near lights, of which per_strength (light, pixel) holds 1 / strength."""
+    v[SENT : SENT + n] = ZERO
+    for light in range(lights):
+        per = per_strength[light]
+        for i in range(n):
+            v[SENT + i] += ONE / (np.float32(lights) * per[i])
 
 
 @FUSED.called

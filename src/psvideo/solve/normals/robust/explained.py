@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.robust.equations import add_equations, solve_equations
+from psvideo.solve.normals.robust.equations import SENT, add_equations, solve_equations
 from psvideo.solve.normals.task import LIGHTS, Floats, Indices, Task
 
 EXPLAINED_SQUARED = np.float32(4.5**2)  # of eight measurements, noise spoils none in 9999 of 10,000 pixels
@@ -30,7 +30,7 @@ def solve_plainly(task: Task, w: Floats, m: Floats, e: Floats, n: int) -> None:
 
 @FUSED.called
 def list_unexplained(
-    task: Task, read: np.float32, photon: np.float32, w: Floats, m: Floats, listed: Indices, n: int
+    task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, listed: Indices, n: int
 ) -> int:
     """List the pixels with a usable measurement that g does not explain to its noise, and return how many they are.
 
@@ -46,7 +46,8 @@ def list_unexplained(
             x, y, z = at(lamp, i)
             a, b, c = w[X + i], w[Y + i], w[Z + i]
             error = m[light, i] - (x * a + y * b + z * c)
-            variance = read + photon * max(m[light, i], ZERO) + LIGHTS * LIGHTS * (a * a + b * b + c * c)
+            share = LIGHTS * v[SENT + i]
+            variance = read + photon * max(m[light, i], ZERO) + share * share * (a * a + b * b + c * c)
             there = m[light, i] > ABSENT
             w[ODD + i] = ONE if there & (error * error > EXPLAINED_SQUARED * variance) else w[ODD + i]
             left = FAR_OFF_SQUARED * variance * (w[COUNT + i] - THREE)

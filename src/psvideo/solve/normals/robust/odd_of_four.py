@@ -11,7 +11,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.robust.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
+from psvideo.solve.normals.robust.equations import DOUBT, LOWER, ODD, RANK, SENT, add_equations, solve_equations
 from psvideo.solve.normals.task import Floats, Task
 
 TWO, FOUR = np.float32(2), np.float32(4)
@@ -84,7 +84,8 @@ def _some_contradict(
     _find_errors(task, w, v, m, e, n)
     some = 0
     for i in range(n):
-        sigma = noise + signal_noise * np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
+        light = v[SENT + i] * np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
+        sigma = noise + signal_noise * light
         contradict = (w[COUNT + i] == FOUR) & (v[SQUARES + i] > (contradiction * sigma) ** 2)
         v[DOUBT + i] = ONE if contradict else ZERO
         some += contradict

@@ -5,7 +5,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals.loops.blocks import COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
-from psvideo.solve.normals.robust.equations import DOUBT, LOWER, SCALE
+from psvideo.solve.normals.robust.equations import DOUBT, LOWER, SCALE, SENT
 from psvideo.solve.normals.robust.few_lights import EIGHT, FOUR
 from psvideo.solve.normals.robust.odd_of_four import TWO
 from psvideo.solve.normals.task import Floats, Weights
@@ -34,14 +34,15 @@ def predict_error(weights: Weights, checked: int, w: Floats, v: Floats, n: int) 
         along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
         solved = (square > ZERO) & (determinant > ZERO) & (count >= THREE)
         across = (xx + yy + zz - along / square) / determinant if solved else ZERO
+        light = np.sqrt(square) * v[SENT + i]
         few = count < np.float32(checked)
-        scale = max(v[SCALE + i], weights.common * np.sqrt(square) if few else ZERO)
+        scale = max(v[SCALE + i], weights.common * light if few else ZERO)
         sigma = max(scale, SUSPICION * v[DOUBT + i]) * (UNCHECKED if count < FOUR else SMALL_SAMPLE)
         spread = max(across * max(count / EIGHT, ONE) / square, ZERO) if solved else ZERO
         error = DEGREES * sigma * np.sqrt(spread) if solved else NO_ERROR
         trusted = error <= weights.most_error_deg
         judged = solved & (not few) & (count > THREE)
-        v[UNEXPLAINED + i] = scale / np.sqrt(square) if judged else ZERO
+        v[UNEXPLAINED + i] = scale / light if judged else ZERO
         v[DOUBT + i] = min(error, NO_ERROR)
         w[X + i] = x if trusted else ZERO
         w[Y + i] = y if trusted else ZERO

@@ -92,7 +92,7 @@ def weigh_reflecting(
     left without what the model adds, for the albedo."""
     gradient = kept[BLOCK * KEPT :].reshape(len(ways), OF_LIGHT, BLOCK)
     _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
-    find_scale(gradient, weights.noise, share, w, v, matte, e, n)
+    find_scale(gradient, weights.least, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
     _take_off(ways, lights, weights, kept, values, n)
 

@@ -16,7 +16,7 @@ from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usab
 from psvideo.solve.normals.loops.near_kernel import lent_task, place_lights
 from psvideo.solve.normals.loops.storing import store_block
 from psvideo.solve.normals.robust.apart import Room, fill_up, memory_for_block, put_side_by_side
-from psvideo.solve.normals.robust.equations import DOUBT
+from psvideo.solve.normals.robust.equations import DOUBT, fill_sent
 from psvideo.solve.normals.robust.explained import list_unexplained, solve_plainly
 from psvideo.solve.normals.robust.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
 from psvideo.solve.normals.robust.reflecting import find_ways
@@ -178,7 +178,7 @@ def _solve_block(
     if known:
         if not summed:
             solve_plainly(task, w, m, room.errors, n)
-        odd = list_unexplained(task, weights.read, weights.photon, w, m, listed, n)
+        odd = list_unexplained(task, weights.read, weights.photon, w, v, m, listed, n)
         v[DOUBT : DOUBT + n] = ZERO
     whole = odd > n * MOST_APART
     if whole:
@@ -219,6 +219,7 @@ def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) 
     w, values, m = room.planes, room.values, room.measurements
     if not distant:
         place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+        fill_sent(task.per_strength, task.lights, room.more, n)
         find_ways(task.matrix, task.per_strength, room.ways, n)
     plain = distant and task.tone.shape[1] == 3 and all_seen(task.seen, row, col, n)
     summed = plain and solve_colours(task, w, values, m, row * task.cols + col, n)

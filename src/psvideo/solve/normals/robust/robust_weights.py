@@ -33,7 +33,7 @@ def solve_reweighted(task: Task, sent: Floats, per: Floats, weights: Weights, ro
     solve_equations(w, n, SOUND_SQUARED, False)
     drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
     for _ in range(weights.rounds):
-        _reweigh(task, sent, weights, weights.signal_noise, weights.tukey, weights.width, False, few, room, n)
+        _reweigh(task, sent, weights.noise, weights.signal_noise, weights.tukey, weights.width, False, few, room, n)
         solve_equations(w, n, SOUND_SQUARED, True)
 
 
@@ -51,20 +51,20 @@ def weigh(
         reflect(task.matrix, room.ways, task.lights, weights, kept, matte, w, v, m, e, n)
         weigh_reflecting(room.ways, task.lights, weights, share, kept, matte, w, v, room.values, m, e, n)
     else:
-        _reweigh(task, sent, weights, share, False, TWO, True, few, room, n)
+        _reweigh(task, sent, weights.least, share, False, TWO, True, few, room, n)
         if few:
             fill_weights(task.matrix, TWO, room.planes, room.more, room.measurements, room.errors, n)
 
 
 @FUSED.inlined
 def _reweigh(
-    task: Task, sent: Floats, weights: Weights, share: np.float32, tukey: bool, width: np.float32, last: bool,
+    task: Task, sent: Floats, noise: np.float32, share: np.float32, tukey: bool, width: np.float32, last: bool,
     few: bool, room: Room, n: int,
 ) -> None:  # fmt: skip
     """SCALE and the normal equations, every measurement weighed by how well the last solution explains it."""
     w, v, m, e = room.planes, room.more, room.measurements, room.errors
     if few:
-        reweigh_few(sent, tukey, width, weights.noise, share, w, v, flattened(m), n)
+        reweigh_few(sent, tukey, width, noise, share, w, v, flattened(m), n)
     else:
-        find_scale(task.matrix, weights.noise, share, w, v, m, e, n)
+        find_scale(task.matrix, noise, share, w, v, m, e, n)
         add_weighted(task.matrix, tukey, width, last, w, v, m, e, n)

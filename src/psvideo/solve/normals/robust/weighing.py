@@ -14,6 +14,11 @@ EVERYTHING_DEG = 179.0
 TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: this wide, Tukey's keeps 95 % of what Gaussian noise holds
 
 
+LEAST_CLAIMED = 0.3
+"""Where the noise is known, residuals predict no less than this much of a dark measurement's: noise is counted beside
+them, and what lies in a dark part of the picture was said to be off by what cameras are thought to have at least."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Reweighting:
     """How measurements are weighed; ``noise`` and ``signal_noise`` are the least that any camera's residuals have.
@@ -57,12 +62,14 @@ def weights(
     """Return what the compiled loops take: ``noise`` is that of a dark measurement and per unit of light (variances),
     ``unit`` turns the model's highlights into the plates' unit of albedo."""
     curve, rough, *shine = (0.0,) * 5 if model is None else model
+    least = min(reweighting.noise, LEAST_CLAIMED * noise[0] ** 0.5) if noise[0] > 0 else reweighting.noise
     tukey = reweighting.loss == "tukey"
     return Weights(
         rounds=reweighting.rounds,
         tukey=tukey,
         width=np.float32(reweighting.width * (TUKEY_WIDTH if tukey else 1.0)),
         noise=np.float32(reweighting.noise),
+        least=np.float32(least),
         signal_noise=np.float32(reweighting.signal_noise),
         darkest=np.float32(reweighting.darkest),
         brightest=np.float32(reweighting.brightest),
