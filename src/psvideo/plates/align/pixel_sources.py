@@ -66,61 +66,103 @@ class Taken:
     shows: InstantSketch
 
 
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """Both plates of a light along the motion, in codes (row, col), and how they differ, ``apart``.
+
+    ``shading`` is by how much they differ as a whole, in a window, and ``own_shading`` on each side of an edge alone;
+    ``own_unlike`` is the square of what their detail differs there. ``evenly`` and ``own_evenly``: both show the same;
+    ``shaded``: one is in shadow. ``window`` is the size of a shading's window in pixels of the grid.
+    """
+
+    before: Codes
+    after: Codes
+    apart: Vectors
+    shading: Vectors
+    own_shading: Vectors
+    own_unlike: Vectors
+    evenly: Flags
+    own_evenly: Flags
+    shaded: Flags
+    window: tuple[int, int]
+
+
 def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
     """Return what every pixel of a light's plate is taken from, on the velocities' grid.
 
     ``guessed``: nothing is measured in it, and what changes as no motion explains is blended by time: at some time
     between the two plates it became what the later one shows, and of all guesses that is the least off.
     """
-    one, other = comparable(pair.before, pair.after)
     spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
-    before, after = (_along(codes, way) for codes, way in zip((one, other), ways, strict=True))
-    apart = np.asarray(cv2.subtract(after, before, dtype=cv2.CV_32F), np.float32)
-    wide, narrow, each = ((odd_width(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX, EACH_PX))
-    shading = np.asarray(cv2.blur(apart, wide), np.float32)
-    unlike = np.asarray(cv2.blur((apart - shading) ** 2, narrow), np.float32)
-    own_shading, own_unlike = evenly_changed(apart, (shading, unlike), each, BARE)
-    shaded = _shaded(before, after, wide)
-    evenly, own_evenly = (_alike(*two) for two in ((shading, unlike), (own_shading, own_unlike)))
-    alike, own_alike = evenly & ~shaded, own_evenly & ~shaded
-    nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
-    source = np.where(motion.moves, np.where(own_unlike < np.float32(TURNED**2), BOTH, nearer), AT_REST)
-    source = source.astype(np.uint8)
-    turns = _turns((shading, evenly & ~motion.moves), (own_shading, own_evenly), wide)
-    source[~motion.moves & turns] = BOTH
-    if guessed:
-        source[~motion.moves & (np.abs(apart) > REST)] = BOTH
+    plates = _compared(pair, ways, motion.step)
+    alike, own_alike = plates.evenly & ~plates.shaded, plates.own_evenly & ~plates.shaded
+    source = _shown_by(plates, motion, nearer=BEFORE if spans_s[0] <= spans_s[1] else AFTER, guessed=guessed)
     gone = [_outside(way) for way in ways]
-    for hidden, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
-        _add_hidden(hidden, motion, alike, span_s, sum(spans_s))
+    for covered, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
+        _add_hidden(covered, motion, alike, span_s, sum(spans_s))
     source[gone[0] & ~gone[1]] = AFTER
     source[gone[1] & ~gone[0]] = BEFORE
     hidden = gone[0] != gone[1]
     noise = noise_between(pair.before, pair.after)
-    unsure = unsure_of(pair, before, after, motion, noise) * ~hidden
-    unsure *= np.where(source == BOTH, _off_of_blend(own_alike, own_shading, own_unlike, shaded), 1)
+    unsure = unsure_of(pair, plates.before, plates.after, motion, noise) * ~hidden
+    unsure *= np.where(source == BOTH, _off_of_blend(plates, own_alike), 1)
+    shown = _shown(plates.before, plates.after, source, spans_s)
     return Taken(
         alike=alike,
         sure=alike | hidden,
         source=source,
         unsure=unsure,
-        shows=InstantSketch(codes=_shown(before, after, source, spans_s), white=pair.before.white, noise=noise),
+        shows=InstantSketch(codes=shown, white=pair.before.white, noise=noise),
     )
 
 
-def _turns(whole: tuple[Vectors, Flags], own: tuple[Vectors, Flags], window: tuple[int, int]) -> Flags:
-    """Return what turns where it stands: it changes evenly over a whole window, or on its own side of an edge, and by
-    as much as what does so around it. Both are by how much plates differ, and where evenly.
+def _compared(pair: Pair, ways: tuple[Vectors, Vectors], step: int) -> Compared:
+    """Return a light's plates brought to the instant along ``ways``, and by how much they differ there."""
+    both = comparable(pair.before, pair.after)
+    before, after = (_along(codes, way) for codes, way in zip(both, ways, strict=True))
+    apart = np.asarray(cv2.subtract(after, before, dtype=cv2.CV_32F), np.float32)
+    wide, narrow, each = ((odd_width(size_px, step),) * 2 for size_px in (SHADING_PX, ALIKE_PX, EACH_PX))
+    shading = np.asarray(cv2.blur(apart, wide), np.float32)
+    unlike = np.asarray(cv2.blur((apart - shading) ** 2, narrow), np.float32)
+    own_shading, own_unlike = evenly_changed(apart, (shading, unlike), each, BARE)
+    return Compared(
+        before=before,
+        after=after,
+        apart=apart,
+        shading=shading,
+        own_shading=own_shading,
+        own_unlike=own_unlike,
+        evenly=_alike(shading, unlike),
+        own_evenly=_alike(own_shading, own_unlike),
+        shaded=_shaded(before, after, wide),
+        window=wide,
+    )
+
+
+def _shown_by(plates: Compared, motion: Followed, *, nearer: int, guessed: bool) -> Codes:
+    """Return which plate shows each pixel, as if nothing were hidden in either."""
+    detail = np.where(plates.own_unlike < np.float32(TURNED**2), BOTH, nearer)
+    source = np.where(motion.moves, detail, AT_REST).astype(np.uint8)
+    source[~motion.moves & _turns(plates, ~motion.moves)] = BOTH
+    if guessed:
+        source[~motion.moves & (np.abs(plates.apart) > REST)] = BOTH
+    return source
+
+
+def _turns(plates: Compared, still: Flags) -> Flags:
+    """Return what turns where it stands (``still``): it changes evenly over a whole window, or on its own side of an
+    edge, and by as much as what does so around it.
 
     What changes by another amount than its surroundings is what an edge passed.
     """
-    shading, evenly = whole
+    evenly = plates.evenly & still
     even = evenly.astype(np.float32)
-    share = np.asarray(cv2.blur(even, window), np.float32)
-    around = np.asarray(cv2.blur(shading * even, window), np.float32) / np.maximum(share, LEAST)
-    beside = own[1] & (share > LEAST) & (np.abs(own[0] - around) < np.float32(BARE))
-    return np.asarray(np.abs(np.where(beside, own[0], np.where(evenly, shading, 0))) > np.float32(REST))
+    share = np.asarray(cv2.blur(even, plates.window), np.float32)
+    around = np.asarray(cv2.blur(plates.shading * even, plates.window), np.float32) / np.maximum(share, LEAST)
+    beside = plates.own_evenly & (share > LEAST) & (np.abs(plates.own_shading - around) < np.float32(BARE))
+    changes = np.where(beside, plates.own_shading, np.where(evenly, plates.shading, 0))
+    return np.asarray(np.abs(changes) > np.float32(REST))
 
 
 def _alike(shading: Vectors, unlike: Vectors) -> Flags:
@@ -138,13 +180,13 @@ def _shown(before: Codes, after: Codes, source: Codes, spans_s: tuple[float, flo
     return np.asarray(np.where(source == AFTER, after, shown), np.uint8)
 
 
-def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags) -> Vectors:
-    """Return by which share of what two plates differ their blend may be off. ``shading`` is by how much they differ as
-    a whole, and ``unlike`` the square of what their detail does."""
-    level, unlike = shading * shading, np.maximum(unlike, np.float32(0))  # sums that run along rows round
+def _off_of_blend(plates: Compared, alike: Flags) -> Vectors:
+    """Return by which share of what two plates differ their blend may be off, ``alike`` where they show the same."""
+    unlike = np.maximum(plates.own_unlike, np.float32(0))  # sums that run along rows round
+    level = plates.own_shading * plates.own_shading
     detail = np.where(alike, BLENDED_ALIKE, BLENDED_UNLIKE)
     squares = (BLENDED**2 * level + detail**2 * unlike) / np.maximum(level + unlike, LEAST)
-    plain = shaded | (np.abs(shading) > EVENLY)
+    plain = plates.shaded | (np.abs(plates.own_shading) > EVENLY)
     return np.asarray(np.where(plain & ~alike, BLENDED_UNLIKE, np.sqrt(squares)), np.float32)
 
 
