@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.clip import Take, keeping_near, open_clip, read_frames
-from psvideo.clip.decode.movies import movie, movie_frames, yuv
+from psvideo.clip.decode.movies import ffmpeg_planes, movie, movie_frames, yuv
 from psvideo.clip.decode.movies.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
@@ -553,6 +553,20 @@ def test_the_streams_transfer_is_held_against_the_plans(
     clip = open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48, transfer=transfer))
     assert [said is not None and said in warning for warning in clip.warnings] == [True] * (said is not None)
     assert bool(clip.curve_doubt) == doubted
+
+
+@pytest.mark.parametrize(("name", "shift"), [("y210le", 6), ("p010le", 6)])
+def test_interleaved_codes_come_out_at_their_places_every_time(name: str, shift: int) -> None:
+    """FFmpeg's threads write over each other's rows where a width is no multiple of 16 pixels."""
+    rows, cols = 1080, 1928
+    frame = av.VideoFrame(cols, rows, name)
+    codes = [np.random.default_rng(1).integers(0, 1024, p.buffer_size // 2, dtype=np.uint16) for p in frame.planes]
+    for plane, held in zip(frame.planes, codes, strict=True):
+        plane.update((held << shift).tobytes())
+    first = codes[0].reshape(rows, -1)
+    luma = first[:, : 2 * cols : 2] if name == "y210le" else first[:, :cols]
+    for _ in range(12):
+        assert np.array_equal(ffmpeg_planes.planes(Path("x.mov"), frame)[0], luma)
 
 
 def test_what_only_the_container_says_of_the_curve_is_read(tmp_path: Path) -> None:

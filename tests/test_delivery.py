@@ -205,6 +205,16 @@ def test_a_movie_shows_the_colours_that_it_was_given(codec: str, suffix: str, pi
     assert [p.name for p in tmp_path.iterdir()] == [path.name], "a movie that fails leaves the one before"
 
 
+def test_a_movie_of_an_odd_width_has_the_same_bytes_whatever_else_runs(tmp_path: Path) -> None:
+    """FFmpeg's threads write over each other where rows end between their steps of pixels."""
+    picture = np.random.default_rng(1).integers(0, 255, (384, 400, 3), dtype=np.uint8)
+    written = set()
+    for _ in range(6):
+        write_movie(tmp_path / "a.mov", [picture] * 12, fps=Fraction(24), codec="prores")
+        written.add((tmp_path / "a.mov").read_bytes())
+    assert len(written) == 1
+
+
 def test_the_timeline_ties_every_sequence_to_the_clip(whole: Path, clip: Path) -> None:
     timeline = otio.adapters.read_from_file(str(whole / "clip.otio"))
     tracks = {track.name: track for track in timeline.tracks}

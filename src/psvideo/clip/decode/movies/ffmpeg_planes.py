@@ -37,6 +37,9 @@ REPACKED = {
 }
 """Interleaved layouts, and the planar one of the same depth, subsampling and colours."""
 
+ONE_THREAD = 1
+"""FFmpeg writes some rows a few pixels too long, over what another thread has written of the next one."""
+
 PLANAR = ("gray", "yuv", "gbr")
 UNREAD = re.compile(r"f16|f32|32[bl]e|41[01]p")
 """Floats, which are no codes; codes of more than 16 bits; and colour for every fourth pixel alone."""
@@ -50,7 +53,7 @@ def planes(path: Path, frame: av.VideoFrame) -> list[NDArray[Any]]:
     """
     name = frame.format.name
     if name in REPACKED:
-        frame = frame.reformat(format=REPACKED[name])
+        frame = frame.reformat(format=REPACKED[name], threads=ONE_THREAD)
     parts = frame.format.components
     known = (name.startswith(PLANAR) and not UNREAD.search(name)) or name in REPACKED
     if not known or len({part.plane for part in parts}) != len(parts):
