@@ -16,6 +16,7 @@ from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.linear import linear_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
+from psvideo.model.turn import EXIF
 
 LOSSLESS_JPEG: dict[str, Any] = {"compression": 7, "compressionargs": {"lossless": True, "bitspersample": 16}}
 Tag = tuple[int, str, int, object, bool]
@@ -133,6 +134,16 @@ def test_raw_picture_is_found_behind_a_thumbnail(tmp_path: Path) -> None:
     picture = decode("dng", tmp_path / "x.dng")
     assert np.array_equal(picture.codes, codes)
     assert picture.header.cfa == "BGGR"
+
+
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_a_dng_that_asks_to_be_turned_is_turned(tmp_path: Path, orientation: int) -> None:
+    with tifffile.TiffWriter(tmp_path / "x.dng") as file:
+        turned = [(274, "H", 1, orientation, True)]
+        file.write(np.zeros((16, 24, 3), np.uint8), photometric="rgb", subifds=1, subfiletype=1, extratags=turned)
+        tags = [(33421, "H", 2, (2, 2), True), (33422, "B", 4, tuple(RGGB), True)]
+        file.write(mosaic(), photometric=32803, extratags=tags)
+    assert read_header("dng", tmp_path / "x.dng").turn == EXIF[orientation]
 
 
 def test_cinema_dng_shows_its_time_code(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import scheduled
-from psvideo.runs.steps.output import take_rate
+from psvideo.runs.steps.output import tags_of, take_rate
 from psvideo.sync.take_timing import find_timing
 from psvideo.synth import TrueClock, expose
 
@@ -443,7 +443,7 @@ def test_frames_of_a_rate_that_changes_are_taken_at_their_own_times(tmp_path: Pa
     clip = open_clip(tmp_path / "x.mkv", plan=tmp_path / "plan.toml")
     assert np.diff(clip.numbers).tolist() == SLOWER, "to the millisecond, as Matroska counts"
     assert clip.plan.camera.fps == RATE
-    assert clip.filmed_plan.camera.fps == plan.camera.fps
+    assert clip.filmed_plan.camera.fps == tags_of(clip).camera_fps == plan.camera.fps
     assert any("varies from 23.9" in warning and "29.9" in warning for warning in clip.warnings)
     timing = find_timing(Take(clip=clip, numbers=clip.numbers))
     assert timing.dropped_frames == ()

@@ -390,7 +390,13 @@ COSTLY = (b"numba.np.arraymath", b"numba.np.linalg", b"numba.cpython.unicode")
 
 @pytest.mark.parametrize(
     "loop",
-    [kernel.solve_rows, robust_kernel.solve_rows, looking.look_rows, looking.count_rows, ambient_kernel.average_rows],
+    [
+        kernel.solve_rows,
+        robust_kernel.solve_rows,
+        looking.look_rows,
+        looking.mark_lit_rows,
+        ambient_kernel.average_rows,
+    ],
     ids=lambda loop: f"{loop.__module__}.{loop.__name__}",
 )
 def test_a_kept_loop_loads_none_of_numbas_mathematics_of_arrays(loop: Any) -> None:

@@ -171,6 +171,21 @@ def test_a_time_code_is_counted_on_to_the_instant_where_it_can_be(tmp_path: Path
 
 
 @pytest.mark.parametrize(
+    ("camera_fps", "fps", "first", "shown"),
+    [
+        (Fraction(2997, 125), 5, "10:00:00:20", "10:00:00:20"),  # 23.976, as it is often written
+        (Fraction(2997, 100), 5, "10:00:00;20", "10:00:00;20"),
+        (Fraction(120), 12, "10:00:00:20", None),  # no frame 20 at 12 a second
+        (Fraction(120), 24, "10:00:00:20", "10:00:00:20"),
+    ],
+)
+def test_a_time_code_counts_the_frames_that_it_was_written_for(
+    camera_fps: Fraction, fps: int, first: str, shown: str | None
+) -> None:
+    assert replace(TAGS, camera_fps=camera_fps, fps=Fraction(fps), first_time_code=first).time_code(0.0) == shown
+
+
+@pytest.mark.parametrize(
     ("first", "frames", "then"),
     [
         ("01:00:59;29", 1, "01:01:00;02"),  # numbers 0 and 1 are left out at a minute's start

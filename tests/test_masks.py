@@ -100,6 +100,16 @@ def test_a_mask_sequence_that_does_not_fit_is_refused_before_anything_is_solved(
         assert not (tmp_path / "out").exists()
 
 
+def test_only_the_results_of_the_frames_that_are_used_need_a_mask(tmp_path: Path) -> None:
+    clip = take(tmp_path / "take", plates() * 3)
+    one = masks(tmp_path / "one", [1001])
+    assert "has no mask for result 1002" in str(solved(clip, tmp_path / "out", mask=one))
+    ps.sync(clip, out=tmp_path / "timing.json")
+    report = solved(clip, tmp_path / "out", mask=one, frames="0-4", timing=tmp_path / "timing.json")
+    assert not isinstance(report, ps.PsvideoError)
+    assert len(report["instants"]) == 1
+
+
 def test_two_masks_of_one_number_are_refused(tmp_path: Path) -> None:
     folder = masks(tmp_path / "a", [1, 2])
     shutil.copyfile(folder / "mask.0001.png", folder / "mask.1.png")

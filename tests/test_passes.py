@@ -98,6 +98,14 @@ def test_plates_that_are_all_noise_have_no_matte_and_no_light() -> None:
     assert made.reach.mean() < 0.01
 
 
+def test_more_lights_are_counted_than_a_byte_holds() -> None:
+    lights = np.tile(DIRECTIONS[[1, 2, 3]], (100, 1))
+    plates = np.full((len(lights), SIZE, SIZE), 0.4)
+    made = passes(plates, lights)
+    assert made.reach is not None
+    assert (made.reach == len(lights)).all()
+
+
 def test_nothing_is_said_outside_the_mask() -> None:
     mask = np.zeros((SIZE, SIZE), np.bool_)
     mask[:, :32] = True

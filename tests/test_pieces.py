@@ -44,6 +44,7 @@ from psvideo.runs.instants.pieces import cut, piece_named
 from psvideo.runs.many_takes import handed_out
 from psvideo.runs.many_takes.cluster import Cluster, connected
 from psvideo.solve import steady
+from psvideo.strobe.runlog import PlayedFlash, RunLog, format_log, plan_sha256
 
 CLIPS: dict[str, dict[str, Any]] = {
     "still": {},
@@ -376,6 +377,40 @@ def test_pieces_replace_what_is_finished_where_that_is_forced(tmp_path: Path) ->
     with whole_folder(out, mark="timing.json", force=True, resume=True, settings="a"):
         pass
     assert [path.name for path in out.iterdir() if not path.name.startswith(".")] == ["timing.json"]
+
+
+def test_pieces_cut_in_two_ways_leave_no_instant_out_of_the_report(tmp_path: Path) -> None:
+    same_in_pieces(filmed(tmp_path, frames=70), tmp_path, ("1/2", "2/3"), preview=())
+
+
+def test_a_strobe_s_log_that_came_meanwhile_makes_it_another_run(tmp_path: Path) -> None:
+    clip = filmed(tmp_path, frames=40)
+    given = {"rig": clip / "rig.toml", "preview": ()}
+    ps.normals(clip, out=tmp_path / "out", piece="1/2", **given)  # type: ignore[arg-type]
+    lit: list[dict[str, int]] = [{}, {"a": 500}, {"b": 1000}, {"c": 1000}]
+    log = RunLog(
+        plan="plan.toml",
+        plan_sha256=plan_sha256(clip / "plan.toml"),
+        board="a board",
+        unit="one",
+        firmware="1",
+        wiring="direct",
+        lines={"a": 0, "b": 1, "c": 2},
+        tick_ps=1_000_000,
+        tolerance_ppm=50.0,
+        flashes=[PlayedFlash(duration_ticks=1000, period_ticks=1000, lit_ticks=one) for one in lit],
+        dark_ticks=10100,
+        cycle_ticks=44400,
+        check=0,
+        started_utc="",
+        stopped_utc="",
+        start_tick=0,
+        cycles=1,
+        ended="done",
+    )
+    (clip / "strobe.json").write_text(format_log(log))
+    with pytest.raises(UsageError, match="other settings, footage, plan"):
+        ps.normals(clip, out=tmp_path / "out", resume=True, **given)  # type: ignore[arg-type]
 
 
 def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ def made() -> InstantPictures:
     source = np.ones((ROWS, COLS), np.uint8)
     surface = Surface(normals=normals, albedo=plane, valid=~none, residual=plane, error_deg=plane, source=source)
     depth = Depth(depth=plane, cut_east=none, cut_south=none, parts=1, metric=True, view=View())
-    passes = Passes(reach=source, specular=plane, alpha=plane)
+    passes = Passes(reach=source.astype(np.uint16), specular=plane, alpha=plane)
     age_s = np.linspace(0, 0.1, ROWS)
     return InstantPictures(
         surface=surface,

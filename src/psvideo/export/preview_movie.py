@@ -89,7 +89,7 @@ def _frame(picture: Pixels, coding: _Coding) -> av.VideoFrame:
         src_color_range=ColorRange.JPEG,
         dst_color_range=ColorRange.MPEG,
         dst_colorspace=Colorspace.ITU709,
-        threads=1,  # FFmpeg writes some rows a few pixels too long, over what another thread has written of the next one
+        threads=1,  # FFmpeg writes some rows a few pixels too long, over what another thread has written of the next
     )
     coded.color_primaries, coded.color_trc = ColorPrimaries.BT709, ColorTrc.IEC61966_2_1
     coded.colorspace, coded.color_range = Colorspace.ITU709, ColorRange.MPEG

@@ -23,7 +23,7 @@ from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient.ambient_followed import update
 from psvideo.plates.ambient.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient.ambient_regression import Separated
-from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, at_true_places, dark_plates, ripple_of, used_of
+from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, at_true_places, dark_plates, ripple_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
@@ -32,6 +32,7 @@ from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separabl
 from psvideo.plates.several_lights.unmixed import slot_names, slot_plates, unmixed
 from psvideo.plates.split import Plate, split
 from psvideo.plates.upright import upright
+from psvideo.plates.used_flashes import used_of
 
 AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
 

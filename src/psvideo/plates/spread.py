@@ -8,10 +8,11 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.ambient.ambient_shown import ambient_near, used_of
+from psvideo.plates.ambient.ambient_shown import ambient_near
 from psvideo.plates.gather import gather
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import FIRST_NUMBER, Round, round_numbers
+from psvideo.plates.used_flashes import used_of
 
 EACH, MOST = 16, 4
 """One round of this many is looked at, and at most this many in all, so that what comes in or turns later is seen."""

@@ -20,12 +20,14 @@ from numpy.typing import NDArray
 from psvideo.clip.decode.tiff import LINEAR_RAW, MOSAIC, MOST_PAGES, check_places, pixels, sample_bits
 from psvideo.clip.record import CodedPicture, Header, Levels, shot_of
 from psvideo.errors import PsvideoError
+from psvideo.model.turn import EXIF, UPRIGHT
 
 FILTERS = "RGB"  # CFAPattern counts red, green, blue as 0, 1, 2
 LINEARIZATION, BLACK_REPEAT, BLACK, BLACK_BY_COL, BLACK_BY_ROW, WHITE = range(50712, 50718)
 CROP_ORIGIN, CROP_SIZE, ACTIVE_AREA = 50719, 50720, 50829
 CFA_SIZE, CFA_PATTERN = 33421, 33422
 TIME_CODES = 51043
+ORIENTATION = 274
 DROP_FRAME = 0x40  # the flag in the byte that counts frames
 DECODED_BY_TIFFFILE = {1, 7, 8, 34892, 52546}  # not compressed; JPEG, lossless too; Deflate; lossy JPEG; JPEG XL
 
@@ -98,6 +100,7 @@ def _header(path: Path, file: tifffile.TiffFile, page: tifffile.TiffPage) -> Hea
         white=white[0],
         cfa=_filters(path, page, cut) if page.photometric == MOSAIC else None,
         colour="unknown",
+        turn=EXIF.get(int(_tag(file.pages[0].aspage(), ORIENTATION) or 1), UPRIGHT),
         time_code=_time_code(file.pages[0].aspage()),
         shot=shot_of({name: _tag(file.pages[0].aspage(), code) for name, code in SHOT_TAGS.items()}),
     )

@@ -58,7 +58,7 @@ def ones_of(mask: NDArray[np.bool_]) -> NDArray[np.float16]:
     return (np.ascontiguousarray(mask).view(np.uint8) * one).view(np.float16)
 
 
-def _as_floats(image: NDArray[np.uint8] | None) -> Image | None:
+def _as_floats(image: NDArray[np.integer] | None) -> Image | None:
     return None if image is None else image.astype(np.float32)
 
 

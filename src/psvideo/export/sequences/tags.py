@@ -10,6 +10,7 @@ from pathlib import Path
 from psvideo import __version__
 from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import Attribute
+from psvideo.formats.frame_rates import broadcast_fps
 from psvideo.formats.paths import check_file
 
 CODE = re.compile(r"(\d\d):(\d\d):(\d\d)([:;.])(\d\d)")
@@ -50,7 +51,8 @@ class Tags:
         """Return the time code of an instant, where the clip has one that goes on to it."""
         if self.first_time_code is None or self.camera_fps is None:
             return None
-        slow = next((rate for rate in (self.camera_fps, self.fps) if _has_time_code(rate)), self.camera_fps)
+        rates = [broadcast_fps(float(rate)) for rate in (self.camera_fps, self.fps)]
+        slow = next((rate for rate in rates if _has_time_code(rate)), rates[0])
         return advanced(self.first_time_code, time_s, slow)
 
     def attributes(self, *, time_s: float, data: bool) -> dict[str, Attribute]:
@@ -96,7 +98,8 @@ def advanced(code: str, time_s: float, fps: Fraction) -> str | None:
     """Return the code of the frame that is exposed at ``time_s``; ``code`` is frame 0's, ``HH:MM:SS:FF``, drop-frame
     with ``;`` or ``.`` before the frame.
 
-    None where that cannot be said: above 30 frames a second, and for drop-frame codes at other rates than 29.97.
+    None where that cannot be said: above 30 frames a second, for drop-frame codes at other rates than 29.97, and for a
+    code that numbers more frames a second than these.
 
     >>> advanced("01:00:59:23", 2 / 24, Fraction(24))
     '01:01:00:01'
@@ -111,7 +114,7 @@ def advanced(code: str, time_s: float, fps: Fraction) -> str | None:
         return None
     hours, minutes, seconds, frame = (int(found[part]) for part in (1, 2, 3, 5))
     drop = found[4] != ":"
-    if drop and fps != DROP_RATE:
+    if frame >= base or (drop and fps != DROP_RATE):
         return None
     frames = ((hours * 60 + minutes) * 60 + seconds) * base + frame
     if drop:

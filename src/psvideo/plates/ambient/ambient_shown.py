@@ -10,12 +10,12 @@ from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
 from psvideo.model.rows.recipe import frames_of
 from psvideo.model.rows.ripple import Ripple
-from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates.ambient.ambient_followed import Ambient, update
 from psvideo.plates.ambient.ambient_regression import Design, Separated, design_of, separated, windows_of
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate, plate_of
+from psvideo.plates.used_flashes import used_of
 
 AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory. Files that hold plain codes are read
@@ -127,20 +127,6 @@ def ambient_near(take: Take, timing: Timing, index: int) -> Ambient | None:
 def ripple_of(take: Take, timing: Timing) -> Ripple | None:
     """Return the ripple that dark slots hold; what windows of frames show in their place is a mean over it."""
     return None if all(flash.lit for flash in take.plan.flashes) else timing.mains
-
-
-def used_of(take: Take, timing: Timing, numbers: Sequence[int] | None = None) -> Timing:
-    """Take as complete only the flashes whose frames all lie between the take's first frame and its last, or between
-    those of ``numbers``."""
-    camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
-    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    used = [places[number] for number in (numbers or take.numbers) if number in places]
-    begin, end = used[0], used[-1]
-    flashes = tuple(
-        replace(flash, complete=flash.complete and bool(first[n] >= begin and last[n] <= end))
-        for n, flash in enumerate(timing.flashes)
-    )
-    return replace(timing, flashes=flashes)
 
 
 def at_true_places(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:

@@ -19,6 +19,7 @@ from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import scheduled
 from psvideo.plates.sequence import round_numbers
+from psvideo.plates.used_flashes import used_of
 from psvideo.runs.steps.caller import Caller
 from psvideo.runs.steps.lighting import Lighting
 from psvideo.runs.steps.output import Output
@@ -88,12 +89,13 @@ def check_camera(space: Space, take: Take, timing: Timing, start_number: int) ->
     if space.moving is None:
         return
     times_s: dict[int, list[float]] = defaultdict(list)
-    for flash, number in zip(timing.flashes, round_numbers(timing.flashes, start=start_number), strict=True):
+    numbers = round_numbers(timing.flashes, start=start_number)
+    for flash, number in zip(used_of(take, timing).flashes, numbers, strict=True):
         if flash.complete and not flash.is_dark:
             times_s[number].append(flash.start_s + flash.duration_s / 2)
     whole = [number for number, times in times_s.items() if len(times) == len(take.plan.lit_slots)]
     for number in (min(whole), max(whole)) if whole else ():
-        space.at(float(np.mean(times_s[number])), number, take.plan.camera.fps)
+        space.at(float(np.mean(times_s[number])), number, take.clip.filmed_plan.camera.fps)
 
 
 def world_doubts(delivery: Delivery, rig: Rig, width_px: int, *, metric: bool) -> tuple[str, ...]:

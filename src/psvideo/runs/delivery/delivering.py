@@ -66,7 +66,7 @@ def surface_job(
     ``depth`` integrates the normals, ``ambient`` is as for ``beauty_of``, and ``blur`` as for ``keep_relit``.
     """
     one = instant.round
-    there = replace(delivery, space=delivery.space.at(one.time_s, one.number, clip.plan.camera.fps))
+    there = replace(delivery, space=delivery.space.at(one.time_s, one.number, clip.filmed_plan.camera.fps))
     beauty = None
     if "beauty" in delivery.aovs:
         image = beauty_of(one, delivery.mix, ambient).image

@@ -141,7 +141,7 @@ def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float
         )
     moving = space.moving is not None
     posed = [number for number in instants if space.name == "world" and (moving or number == min(instants))]
-    fps = clip.plan.camera.fps
+    fps = clip.filmed_plan.camera.fps
     return StageView(
         focal=focal,
         middle=middle,

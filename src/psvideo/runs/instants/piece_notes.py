@@ -106,7 +106,7 @@ def noted_subject(folder: Path) -> Subject | None:
 
 
 def noted(folder: Path) -> Iterator[tuple[range, Found]]:
-    """Give what pieces found, in the order of their instants, each as far as it goes beyond the ones before.
+    """Give what pieces found, in the order of their first instants; pieces that were cut in two ways overlap.
 
     Raises PsvideoError where a file is damaged.
     """

@@ -21,12 +21,13 @@ from psvideo.export.sequences.result_files import is_written
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Schedule
-from psvideo.plates.ambient.ambient_shown import ambient_before, used_of
+from psvideo.plates.ambient.ambient_shown import ambient_before
 from psvideo.plates.gather import scheduled
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import POOLED_ROUNDS, round_numbers
 from psvideo.plates.several_lights.unmixed import slot_names
+from psvideo.plates.used_flashes import used_of
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece
 from psvideo.runs.instants.piece_notes import FOLDER, note_subject, note_timing, noted, noted_subject, write_notes
 from psvideo.runs.instants.reporting import observing
@@ -80,18 +81,15 @@ def pieces_begun(folder: Path) -> bool:
 
 def pieced_together(job: Job, folder: Path, *, watch: Watch = unwatched) -> Found:
     """Solve what no piece has solved yet, and return what all of them found."""
-    done = [numbers for numbers, found in noted(folder) if _is_there(job, folder, found)]
-    missing = [*_missing(Succession(job).numbers, done)]
+    missing = [*_missing(Succession(job).numbers, _done(job, folder))]
     job = _knowing_subject(job, folder, watch=watch) if missing else job
     beginning = beginning_of(job) if missing else None
     for numbers in missing:
         _written(job, folder, numbers, beginning, watch=watch)
-    whole = Found(observed=observing(job.take, job.lighting.rig, job.lighting.masks))
-    until = 0
+    whole, chosen = Found(observed=observing(job.take, job.lighting.rig, job.lighting.masks)), _done(job, folder)
     for numbers, found in noted(folder):
-        if numbers.start >= until:  # else cut in another way, and solved twice
+        if numbers in chosen:
             whole.followed_by(found)
-            until = numbers.stop
     return whole
 
 
@@ -108,6 +106,16 @@ def _knowing_subject(job: Job, folder: Path, *, watch: Watch) -> Job:
     if job.subject is not None:
         note_subject(folder, job.subject)
     return job
+
+
+def _done(job: Job, folder: Path) -> list[range]:
+    """Return the numbers of the pieces that are done, none of which reaches into another: a folder's pieces may have
+    been cut in several ways, and what is between those that are chosen is solved again."""
+    done: list[range] = []
+    for numbers, found in noted(folder):
+        if numbers.start >= (done[-1].stop if done else 0) and _is_there(job, folder, found):
+            done.append(numbers)
+    return done
 
 
 def _is_there(job: Job, folder: Path, found: Found) -> bool:

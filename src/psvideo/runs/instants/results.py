@@ -18,6 +18,7 @@ from psvideo.formats.whole_files import write_text
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.sequence import coming
 from psvideo.plates.several_lights.unmixed import unmixing_note
+from psvideo.plates.used_flashes import used_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.beforehand import check_delivery, pass_doubts, say_instants, world_doubts
@@ -94,7 +95,8 @@ def _checked(job: Job, output: Output) -> Job:
             "Leave one of the two out."
         )
     if masks is not None and over_time.aligning.rate == "round":
-        coming_rounds = coming(take.plan, timing.flashes, start=job.start_number).items()
+        within = used_of(take, timing).flashes
+        coming_rounds = coming(take.plan, timing.flashes, start=job.start_number, within=within).items()
         masks.check(number for number, lights in coming_rounds if lights >= set(take.plan.lights))
     due = say_instants(take, timing, over_time.aligning, output)
     if due is not None and masks is not None:

@@ -55,11 +55,12 @@ class Output:
 
 
 def _identity(take: Take) -> list[object]:
-    """Return what distinguishes a take from others, and from itself once its plan or a file of it was changed."""
+    """Return what distinguishes a take from others, and from itself once its plan, its strobe's log (by which the plan
+    is as played) or a file of it was changed."""
     clip = take.clip
     files = clip.files if clip.is_movie else [clip.file_of(number) for number in take.numbers]
     facts = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files]
-    return [clip.path.resolve(), sha256_of(clip.plan_path), take.numbers, facts]
+    return [clip.path.resolve(), sha256_of(clip.plan_path), clip.plan, take.numbers, facts]
 
 
 def folder_of(output: Output) -> AbstractContextManager[Path]:
@@ -138,7 +139,7 @@ def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPAC
         rig_sha256=None if rig_path is None else sha256_of(rig_path),
         space=space.name,
         y=space.y,
-        camera_fps=clip.plan.camera.fps,
+        camera_fps=clip.filmed_plan.camera.fps,
         first_time_code=clip.time_code,
         shot=clip.header.shot,
     )

@@ -11,7 +11,7 @@ from psvideo.compute.spilled import let_go
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.bucket_queue import queue_for
 from psvideo.solve.filling.growing import grow
-from psvideo.solve.filling.looking import Said, count_rows, look_rows, said_for
+from psvideo.solve.filling.looking import Said, look_rows, mark_lit_rows, said_for
 from psvideo.solve.filling.neighbours import REACH_PX
 from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
@@ -102,14 +102,14 @@ def _wanted(solved: Mask, one: Evidence) -> Mask:
 
 def _lit(solved: Mask, one: Evidence) -> Bytes:
     """Return 1 where any light reaches a pixel or it is solved, else 0."""
-    counts = np.zeros(solved.shape, np.uint8)
+    lit = solved.astype(np.uint8)
     asked = np.ascontiguousarray(~solved).view(np.uint8)
 
-    def count(given: Task, work: Work, first: int, last: int) -> None:
-        count_rows(given, work, asked, counts, first, last)
+    def mark(given: Task, work: Work, first: int, last: int) -> None:
+        mark_lit_rows(given, work, asked, lit, first, last)
 
-    one.in_bands(count, None, needed=np.asarray(~solved.all(axis=1)))
-    return ((counts > 0) | solved).view(np.uint8)
+    one.in_bands(mark, None, needed=np.asarray(~solved.all(axis=1)))
+    return lit
 
 
 def holes_in(subject: Mask) -> Mask:

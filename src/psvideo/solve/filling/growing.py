@@ -107,7 +107,7 @@ def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
 def _estimate(p: Tiles, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
     nx, ny, nz, albedo, reds, blues = from_neighbours(p, s, row, col)
-    count = min(s.reached[pixel], 2)
+    count = s.reached[pixel]
     if count == 2:
         nx, ny, nz, albedo = from_two(s, pixel, nx, ny, nz, albedo)
     elif count == 1:

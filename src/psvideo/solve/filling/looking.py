@@ -12,13 +12,16 @@ from psvideo.solve.normals.loops.measuring import any_asked, is_clipped, is_seen
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Task, Work
 
+MOST_COUNTED = 2
+"""Lights that a filled normal is made from."""
+
 
 class Said(NamedTuple):
     """What the lights say of every pixel that is to be filled (pixel, ...), in units of albedo.
 
-    reached: how many lights reach it. bright: what the brightest and the next one show, 0 where there is none.
-    towards: (pixel, 2, 3), the unit directions to those two. colour: (pixel, 3), the sum over the lights that reach it,
-    alike in all three where the picture is grey. noise: of a colour's sum, as a standard deviation.
+    reached: how many lights reach it, counted up to two. bright: what the brightest and the next one show, 0 where
+    there is none. towards: (pixel, 2, 3), the unit directions to those two. colour: (pixel, 3), the sum over the lights
+    that reach it, alike in all three where the picture is grey. noise: of a colour's sum, as a standard deviation.
     """
 
     reached: Bytes
@@ -40,11 +43,11 @@ def said_for(pixels: int, noise: float) -> Said:
 
 
 @FUSED.kept
-def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int, last: int) -> None:
-    """Count for every ``wanted`` pixel (row, col) of the rows the lights that reach it, into ``counts``; those whose
-    plates are saturated there reach it too."""
+def mark_lit_rows(task: Task, work: Work, wanted: Bytes, lit: Bytes, first: int, last: int) -> None:
+    """Set ``lit`` (row, col) to 1 at every ``wanted`` pixel of the rows that any light reaches; a light whose plate is
+    saturated there reaches it too."""
     t = lent_task(task, work.matrix, work.per_strength)
-    asked, found, values = lent(wanted), lent(counts), lent(work.values)
+    asked, found, values = lent(wanted), lent(lit), lent(work.values)
     channels = t.tone.shape[1]
     share = ONE / np.float32(channels)
     for row in range(first, last):
@@ -62,7 +65,8 @@ def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int,
                     for channel in range(channels):
                         bright += values[light * channels + channel, i]
                     over = is_clipped(t, samples, light, i) and is_seen(t.seen, light, row, col + i)
-                    found[row, col + i] += over or bright * at(per, i) * share > t.dark
+                    if over or bright * at(per, i) * share > t.dark:
+                        found[row, col + i] = 1
 
 
 @FUSED.kept
@@ -101,7 +105,8 @@ def look_rows(
                     if not level > t.dark:
                         continue
                     level *= scale
-                    count[place] += 1
+                    if count[place] < MOST_COUNTED:
+                        count[place] += 1
                     for channel in range(3):
                         source = min(channel, channels - 1)
                         colour[place, channel] += max(values[light * channels + source, i], ZERO)

@@ -45,7 +45,7 @@ class Passes:
     alpha: (row, col), 0 to 1, how much of a pixel the subject covers.
     """
 
-    reach: NDArray[np.uint8] | None = None
+    reach: NDArray[np.uint16] | None = None
     specular: NDArray[np.float32] | None = None
     alpha: NDArray[np.float32] | None = None
     specular_of: tuple[NDArray[np.float16], ...] = ()

@@ -66,14 +66,14 @@ def _sent(lit: Illumination, light: int, first: int, last: int) -> Floats:
     return np.asarray(sent / field.middle_gain[light], np.float32)
 
 
-def reach_of(one: Explaining) -> NDArray[np.uint8]:
+def reach_of(one: Explaining) -> NDArray[np.uint16]:
     """Return how many lights reach each pixel, (row, col).
 
     A light reaches a pixel that it lights certainly (beyond noise), and by no less than SHADOWED of what it would give
     unhindered; where the surface turns away from it, or is not known, by more than light from around (INDIRECT).
     Clipped is lit.
     """
-    reach = np.zeros(one.rows.shape[:2], np.uint8)
+    reach = np.zeros(one.rows.shape[:2], np.uint16)
     lights, dark = len(one.lit.names), np.float32(one.dark)
     strength = one.lit.intensities.mean(axis=1).astype(np.float32)
 
