@@ -136,6 +136,24 @@ def test_raw_picture_is_found_behind_a_thumbnail(tmp_path: Path) -> None:
     assert picture.header.cfa == "BGGR"
 
 
+@pytest.mark.parametrize("kind", [np.uint16, np.float16, np.float32])
+def test_every_place_of_a_mosaic_has_its_own_black(tmp_path: Path, kind: type) -> None:
+    black = np.array([[100, 300], [200, 400]])
+    codes: NDArray[Any] = np.random.default_rng(1).integers(500, 2000, (16, 24)).astype(kind)
+    tags: list[Tag] = [(50713, "H", 2, (2, 2), True), (50714, "H", 4, tuple(map(int, black.ravel())), True)]
+    write_dng(tmp_path / "x.dng", codes, [*tags, (50717, "H", 1, 4000, True)])
+    zero = np.tile(black, (8, 12))
+    light = linear_light(decode("dng", tmp_path / "x.dng"), Encoding())
+    assert light == pytest.approx((codes.astype(np.float64) - zero) / (4000 - zero), abs=1e-6)
+
+
+def test_a_colour_picture_whose_black_differs_from_place_to_place_is_refused(tmp_path: Path) -> None:
+    tags: list[Tag] = [(50713, "H", 2, (1, 2), True), (50714, "H", 6, (100, 100, 100, 300, 300, 300), True)]
+    write_dng(tmp_path / "x.dng", np.full((8, 12, 3), 500, np.uint16), tags)
+    with pytest.raises(PsvideoError, match=r"x\.dng: is a colour picture whose black levels differ"):
+        read_header("dng", tmp_path / "x.dng")
+
+
 @pytest.mark.parametrize("orientation", [1, 3, 6, 8])
 def test_a_dng_that_asks_to_be_turned_is_turned(tmp_path: Path, orientation: int) -> None:
     with tifffile.TiffWriter(tmp_path / "x.dng") as file:

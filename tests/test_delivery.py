@@ -1,6 +1,7 @@
 """What lies beside the maps of a delivery: plates, their sum, movies, the timeline, presets and their notes."""
 
 import hashlib
+import re
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -16,9 +17,11 @@ from psvideo.cli.options.per_light import parse_weights
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.preview_movie import even, write_movie
-from psvideo.export.programs.delivered import Delivered
+from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.programs.loading_notes import loading_note
+from psvideo.export.programs.nuke_script import nuke_script
 from psvideo.export.programs.otio import Footage, Images, timeline_text
+from psvideo.export.usd.usd_stage import StageView, stage_text
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
@@ -345,8 +348,7 @@ def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: 
     assert at_odds == ()
     made = Delivered(
         clip="take7",
-        first=1001,
-        last=1100,
+        numbers=tuple(range(1001, 1101)),
         fps=Fraction(24000, 1001),
         width_px=64,
         height_px=48,
@@ -399,10 +401,39 @@ def test_depth_alone_is_no_position_in_a_programs_note(program: Program) -> None
     delivery, _ = delivery_of(replace(NOTHING, preset=program, aov=("depth",)))
     delivery = replace(delivery, aovs=tuple(one for one in delivery.aovs if one != "position"))
     made = Delivered(
-        clip="take7", first=1, last=9, fps=Fraction(24), width_px=64, height_px=48, metric=False, delivery=delivery
+        clip="take7", numbers=(1, 2, 9), fps=Fraction(24), width_px=64, height_px=48, metric=False, delivery=delivery
     )
     said = loading_note(program, made)
+    assert "Numbers 1 to 9 (3 results; 6 numbers between them missing)" in said
     assert "Depth is in a relative unit." in said
     assert "Positions are" not in said
     assert "positions = position" not in said
     assert "relative positions" not in said
+
+
+@pytest.mark.parametrize("name", ["take [3]", '5$ "a"', "back\\slash", "plain_01"])
+def test_tcl_leaves_a_clip_s_name_in_nuke_s_script_as_nuke_is_to_read_it(name: str) -> None:
+    tcl = pytest.importorskip("tkinter").Tcl()
+    delivery, _ = delivery_of(replace(NOTHING, preset="nuke"))
+    made = Delivered(
+        clip=name, numbers=(1, 2), fps=Fraction(24), width_px=64, height_px=48, metric=False, delivery=delivery
+    )
+    said = re.search(r'^ file (".*")$', nuke_script(made), re.MULTILINE)
+    assert said is not None
+    knob = tcl.eval(f"set knob {said.group(1)}")
+    in_brackets = re.sub(r"([\[\]\\])", r"\\\1", name)
+    assert knob == f"[file dirname [value root.name]]/normals/{in_brackets}_normals.%04d.exr"
+
+
+@pytest.mark.parametrize("lights", [("key-1", "key_1"), ("左", "右"), ("3", "_3")])
+def test_lights_that_usd_cannot_tell_apart_get_names_of_their_own(lights: tuple[str, ...], tmp_path: Path) -> None:
+    usd = pytest.importorskip("pxr.Usd")
+    delivery, _ = delivery_of(replace(NOTHING, preset="houdini"))
+    made = Delivered(
+        clip="a@b", numbers=(1, 2), fps=Fraction(24), width_px=64, height_px=48, metric=False, delivery=delivery
+    )
+    seen = tuple(SeenLight(name=one, direction=(0, 0, 1)) for one in lights)
+    view = StageView(focal=1.0, middle=(0.0, 0.0), away_m=None, poses={}, lights=seen)
+    (tmp_path / "x.usda").write_text(stage_text(made, (1, 2), view), encoding="utf-8")
+    stage = usd.Stage.Open(str(tmp_path / "x.usda"))
+    assert len([prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight"]) == len(lights)

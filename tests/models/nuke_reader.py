@@ -117,8 +117,11 @@ def picture_of(node: Node, script: Path, frame: int, *, group: Node | None = Non
 def _read(node: Node, script: Path, frame: int) -> Picture:
     assert node.knobs["raw"] == "true", "vectors and linear light are read without a colour space"
     assert int(node.knobs["first"]) <= frame <= int(node.knobs["last"])
-    (file,) = shlex.split(node.knobs["file"])
-    file = file.replace("[file dirname [value root.name]]", str(script.parent)) % frame
+    quoted = node.knobs["file"].removeprefix('"').removesuffix('"')
+    assert not re.search(r"(?<!\\)(?:\\\\)*[\[$]", quoted), "Tcl would evaluate it while the script is opened"
+    knob = re.sub(r"\\(.)", r"\1", quoted)
+    knob = knob.replace("[file dirname [value root.name]]", str(script.parent))
+    file = re.sub(r"\\(.)", r"\1", knob) % frame
     channels = OpenEXR.File(file, separate_channels=True).channels()
     names = "RGB" if "R" in channels else "YYY"
     rgb = [channels[name].pixels.astype(np.float64) for name in names]

@@ -105,7 +105,7 @@ def _numbered(images: list[Path]) -> list[Path]:
 
 
 def _number(file: Path) -> int:
-    return int(_parts(file)[1])
+    return int(numbered_name(file)[1])
 
 
 def number_of(file: Path) -> int | None:
@@ -114,9 +114,14 @@ def number_of(file: Path) -> int | None:
     return int(match[2]) if match else None
 
 
-def _parts(file: Path) -> tuple[str, str]:
+def numbered_name(file: Path) -> tuple[str, str]:
+    """Return what comes before a frame's number in its file's name, and the number's digits; none where it has none.
+
+    >>> numbered_name(Path("take.0001.png")), numbered_name(Path("shot (12).png"))
+    (('take.', '0001'), ('shot (', '12'))
+    """
     match = NUMBERED.fullmatch(file.stem) or BRACKETED.fullmatch(file.stem)
-    return (match[1], match[2]) if match else (file.stem, "")
+    return (file.stem[: match.start(2)], match[2]) if match else (file.stem, "")
 
 
 def _nothing(folder: Path, images: list[Path]) -> str:
@@ -148,7 +153,7 @@ def _refuse_mixture(frames: list[Path]) -> None:
     for file in frames:
         if KINDS[file.suffix.lower()] != KINDS[first.suffix.lower()]:
             what = "images of two kinds"
-        elif _parts(file)[0] != _parts(first)[0]:
+        elif numbered_name(file)[0] != numbered_name(first)[0]:
             what = "two sequences"
         else:
             continue

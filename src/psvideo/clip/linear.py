@@ -35,7 +35,7 @@ def in_codes(picture: CodedPicture | PictureInFile, encoding: Encoding) -> Coded
         return Coded(
             codes=codes, tone=_tone(_scale(head, encoding), encoding.transfer, black, white, codes.dtype.itemsize)
         )
-    if codes.dtype == np.float16:
+    if codes.dtype == np.float16 and (black is None or len({level for row in black for level in row}) == 1):
         return Coded(codes=codes.view(np.uint16), tone=_half_tone(encoding.transfer, black, white))
     if black is None and white is None and not find_curve(encoding.transfer).source:
         return Coded(codes=codes if codes.dtype == np.float32 else np.asarray(codes, np.float32), tone=IDENTITY)
@@ -156,11 +156,15 @@ def _curved(scale: Scale, transfer: str, bytes_per_code: int) -> NDArray[np.floa
 def _float_light(
     codes: NDArray[np.floating], transfer: str, black: Levels | None, white: float | None
 ) -> NDArray[np.float32]:
-    """Floating point pictures hold light already: they are scaled only where levels are given."""
+    """Floating point pictures hold light already: they are scaled only where levels are given, by position."""
     curve = find_curve(transfer)
-    light = np.asarray(to_light(curve, codes) if curve.source else codes, np.float32)
+    light = np.array(to_light(curve, codes) if curve.source else codes, np.float32)
     if black is None and white is None:
         return light
-    ends = to_light(curve, np.array([black[0][0] if black else 0.0, 1.0 if white is None else white]))
-    black_light = ends[0] if black else 0.0
-    return np.asarray((light - np.float32(black_light)) / np.float32(ends[1] - black_light), np.float32)
+    one = float(to_light(curve, np.array([1.0 if white is None else white]))[0])
+    zeros = to_light(curve, np.array(black)) if black else np.zeros((1, 1))
+    rows, cols = zeros.shape
+    for (row, col), zero in np.ndenumerate(zeros):
+        place = np.s_[...] if zeros.size == 1 else np.s_[row::rows, col::cols]
+        light[place] = (light[place] - np.float32(zero)) / np.float32(one - zero)
+    return light

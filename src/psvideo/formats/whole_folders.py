@@ -20,8 +20,9 @@ if sys.platform != "win32":
 
 SETTINGS = ".settings"
 """In a folder that is or was written: a digest of what the run was given, so that only the same run resumes it."""
-UNFINISHED = ".*.partial"
-"""Files that a run was writing when it was killed (``whole_files``)."""
+UNFINISHED = ".*.partial*"
+"""Files that a run was writing when it was killed (``whole_files``); libraries that know kinds of files by their
+endings add one."""
 
 
 @contextlib.contextmanager

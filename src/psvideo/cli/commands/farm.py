@@ -48,10 +48,10 @@ def farm(
     words = _checked(options or [])
     lines = write_job(clip, rig=rig, out=out, results=results, plan=plan, pieces=pieces, words=words, force=force)
     voice.result({"commands": lines})
-    if commands:
+    if commands or out is None:
         for line in lines:
             voice.say(line)
-    elif out is not None:
+    else:
         cut = counted(len(lines) - 2, "piece")
         voice.say(f"{out}: a job of {cut}. See {out / 'README.txt'} for how to run it.")
 

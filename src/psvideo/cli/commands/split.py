@@ -76,6 +76,5 @@ def split(
     voice.result(timing_record(report.timing))
     voice.say(describe_timing(report.timing))
     print_report(voice, report)
-    plates = sum(flash.plate is not None for flash in report.timing.flashes)
-    made = counted(plates, "plate") if instants.fps == "round" else counted(len(report.instants), "instant")
-    voice.say(f"{out}: {made} written; see {out / 'report.html'}.")
+    made = "plates" if instants.fps == "round" else counted(len(report.instants), "instant")
+    voice.say(f"{out}: {made} of {counted(len(report.lights), 'light')} written; see {out / 'report.html'}.")

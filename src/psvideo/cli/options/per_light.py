@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from psvideo.cli.options.typed import parse_fraction
 from psvideo.errors import UsageError, nearest
+from psvideo.formats.contract import TAKEN_NAMES
 
 
 def parse_lights(text: str) -> tuple[str, ...]:
@@ -19,8 +20,10 @@ def parse_lights(text: str) -> tuple[str, ...]:
             )
         if names.count(name) > 1:
             raise UsageError(f"--lights {text!r} names {name!r} twice. Give every light a name of its own.")
-        if name.lower() == "ambient":
-            raise UsageError(f"--lights {text!r}: the name 'ambient' is taken by the dark slot. Choose another name.")
+        if name.lower() in TAKEN_NAMES:
+            raise UsageError(
+                f"--lights {text!r}: {name!r} names what lies beside the lights' plates. Choose another name."
+            )
     return names
 
 

@@ -162,6 +162,11 @@ def _black(path: Path, page: tifffile.TiffPage, cut: Cut) -> Levels:
             f"{path}: has black levels {levels.tolist()} that do not fit its pattern of {rows} x {cols}: expected one "
             "for each place of the pattern. Convert the file again."
         )
+    if page.photometric == LINEAR_RAW and np.ptp(levels):
+        raise PsvideoError(
+            f"{path}: is a colour picture whose black levels differ from place to place, {levels[..., 0].tolist()}: "
+            "expected one. Give black_level in the plan after converting the files to one level."
+        )
     shifted = np.roll(levels[..., 0], (-cut.row_in_area, -cut.col_in_area), axis=(0, 1))
     return tuple(tuple(map(float, row)) for row in shifted)
 

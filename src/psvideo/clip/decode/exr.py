@@ -217,6 +217,6 @@ def _in_display_window(codes: NDArray[Any], attributes: Any, head: Header) -> ND
     canvas = np.zeros((head.height_px, head.width_px, *codes.shape[2:]), codes.dtype)
     col, row = (int(data[0][axis] - display[0][axis]) for axis in (0, 1))
     top, left = max(row, 0), max(col, 0)
-    part = codes[top - row : head.height_px - row, left - col : head.width_px - col]
+    part = codes[top - row : max(head.height_px - row, 0), left - col : max(head.width_px - col, 0)]
     canvas[top : top + part.shape[0], left : left + part.shape[1]] = part
     return canvas

@@ -15,13 +15,17 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.paths import path_of
 
 
-def _codes(kind: str, path: Path) -> NDArray[Any]:
-    """Decode a mask; PNGs in any of the ways in which painting programs save black and white (1 bit, palettes)."""
+def _codes(kind: str, path: Path) -> tuple[NDArray[Any], float]:
+    """Decode a mask, and return which code is white.
+
+    PNGs may be saved in any of the ways in which painting programs save black and white (1 bit, palettes).
+    """
     if kind == "png":
-        with contextlib.suppress(OSError, Image.DecompressionBombError), Image.open(path) as picture:
-            if picture.mode in ("1", "P"):
-                return np.asarray(picture.convert("L"))
-    return decode(kind, path).codes
+        with contextlib.suppress(OSError, Image.DecompressionBombError), Image.open(path) as painted:
+            if painted.mode in ("1", "P"):
+                return np.asarray(painted.convert("L")), 255.0
+    picture = decode(kind, path)
+    return picture.codes, 1.0 if picture.header.bits is None else 2.0**picture.header.bits - 1
 
 
 def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int | None = None) -> NDArray[np.bool_]:
@@ -58,7 +62,7 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
         raise PsvideoError(f"{path}: is not a picture that can be a mask; expected one of {', '.join(USUAL_KINDS)}.")
     if not path.is_file():
         raise PsvideoError(f"{path}: there is no such mask. Check the name.")
-    codes = _codes(kind, path)
+    codes, white = _codes(kind, path)
     brightest = stated_by(path).turn.upright(codes if codes.ndim == 2 else codes.max(axis=2))
     rows, cols = brightest.shape
     if height_px not in (rows, None) or width_px not in (cols, None):
@@ -66,7 +70,6 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
             f"{path}: the mask is {cols} x {rows} pixels, and the frames are {width_px or cols} x {height_px or rows}. "
             "Paint it over a frame or a plate of this clip."
         )
-    white = np.iinfo(codes.dtype).max if np.issubdtype(codes.dtype, np.integer) else 1.0
     mask: NDArray[np.bool_] = brightest > 0.5 * white
     if not mask.any():
         raise PsvideoError(f"{path}: the mask is black everywhere; paint white where normals are wanted.")

@@ -18,14 +18,26 @@ class SeenLight:
 
 @dataclass(frozen=True, kw_only=True)
 class Delivered:
-    """What other programs have to know of one delivery. ``lights`` are empty where they have no one direction."""
+    """What other programs have to know of one delivery.
+
+    ``numbers`` rise; ``lights`` are empty where they have no one direction.
+    """
 
     clip: str
-    first: int
-    last: int
+    numbers: tuple[int, ...]
     fps: Fraction
     width_px: int
     height_px: int
     metric: bool
     delivery: Delivery
     lights: tuple[SeenLight, ...] = ()
+
+    @property
+    def first(self) -> int:
+        """The number of the first instant."""
+        return self.numbers[0]
+
+    @property
+    def last(self) -> int:
+        """The number of the last instant."""
+        return self.numbers[-1]

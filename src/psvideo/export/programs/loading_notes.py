@@ -10,6 +10,7 @@ from psvideo.export.programs.blender_addon import ADDON_FILE
 from psvideo.export.programs.delivered import Delivered
 from psvideo.export.sequences.result_files import result_name
 from psvideo.model.choices import Program
+from psvideo.model.units import counted
 
 
 def note_name(program: Program) -> str:
@@ -38,7 +39,9 @@ def loading_note(program: Program, made: Delivered) -> str:
 
 
 def _facts(made: Delivered) -> list[str]:
-    space, count = made.delivery.space, made.last - made.first + 1
+    space, count = made.delivery.space, len(made.numbers)
+    missing = made.last - made.first + 1 - count
+    results = counted(count, "result") + (f"; {counted(missing, 'number')} between them missing" if missing else "")
     frame = {
         "camera": "camera space: x right, y up, z towards the camera",
         "world": f"world space: the axes of the camera's file, {space.up} up",
@@ -48,7 +51,7 @@ def _facts(made: Delivered) -> list[str]:
     flipped = "; the green channel is flipped (y down, DirectX)" if space.y == "down" else usual
     rate = f"{float(made.fps):.6g}" + (f" ({made.fps})" if made.fps.denominator > 1 else "")
     facts = [
-        f"Numbers {made.first} to {made.last} ({count}), {rate} frames a second.",
+        f"Numbers {made.first} to {made.last} ({results}), {rate} frames a second.",
         f"Normals are in {frame}{flipped}.",
         "EXR: signed unit vectors, -1 to 1, and 0 where there is none. They are data: no colour space, no curve.",
     ]

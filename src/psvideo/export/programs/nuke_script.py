@@ -10,8 +10,9 @@ import re
 from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.sequences.result_files import result_name
 
-FOLDER = "[file dirname [value root.name]]"
-"""Where the script lies, in Nuke's own words: the delivery may be moved as a whole."""
+FOLDER = r"\[file dirname \[value root.name]]"
+"""Where the script lies, in Nuke's own words: the delivery may be moved as a whole. The brackets are for Nuke, which
+evaluates them whenever it reads a file, and not for the script, which would while it is opened."""
 GROUP = """Group {{
  inputs 2
  name {name}
@@ -97,12 +98,26 @@ def _root(made: Delivered, size: str) -> str:
 
 
 def _read(made: Delivered, quantity: str, size: str) -> str:
-    file = result_name(made.clip, quantity, made.first).removesuffix(f".{made.first:04d}.exr") + ".%04d.exr"
+    name = result_name(made.clip, quantity, made.first).removesuffix(f".{made.first:04d}.exr")
+    file = _literal(name) + ".%04d.exr"
     return (
         f'Read {{\n inputs 0\n file_type exr\n file "{FOLDER}/{file}"\n format "{size}"\n first {made.first}\n '
         f"last {made.last}\n origfirst {made.first}\n origlast {made.last}\n origset true\n raw true\n "
         f"name {quantity}\n}}\n"
     )
+
+
+def _literal(name: str) -> str:
+    r"""Return a file's name as a script holds it in quotes, so that nothing in it is evaluated.
+
+    Scripts are Tcl, which reads brackets, dollars, quotes and backslashes first. What is left is a knob's text, in
+    which Nuke evaluates what stands in brackets, unless they follow a backslash.
+
+    >>> print(_literal("take [3]"), _literal('5$ "a"'))
+    take \\\[3\\\] 5\$ \"a\"
+    """
+    knob = re.sub(r"([\[\]\\])", r"\\\1", name)
+    return re.sub(r'([\[\]\\$"])', r"\\\1", knob)
 
 
 def _group(light: SeenLight) -> str:

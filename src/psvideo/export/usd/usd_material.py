@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from psvideo.export.programs.delivered import Delivered
 from psvideo.export.sequences.result_files import result_name
-from psvideo.export.usd.usda import prim
+from psvideo.export.usd.usda import asset, prim
 
 MATERIAL = "/delivery/surface"
 
@@ -51,7 +51,7 @@ def material(made: Delivered, numbers: Sequence[int], *, with_normals: bool) -> 
 
 
 def _files(made: Delivered, quantity: str, numbers: Sequence[int], suffix: str = "exr") -> list[str]:
-    first, *_ = names = [f"@./{result_name(made.clip, quantity, number, suffix=suffix)}@" for number in numbers]
+    first, *_ = names = [asset(result_name(made.clip, quantity, number, suffix=suffix)) for number in numbers]
     still = [f"asset inputs:file = {first}"]
     if len(names) == 1:
         return still

@@ -16,7 +16,7 @@ import numpy as np
 from psvideo.export.mesh_files import animation_name
 from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.usd.usd_material import MATERIAL, material
-from psvideo.export.usd.usda import identifier, indented, matrix_of, numbers_of, prim
+from psvideo.export.usd.usda import asset, identifiers, indented, matrix_of, numbers_of, prim
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light
 
@@ -57,7 +57,11 @@ def stage_text(made: Delivered, numbers: Sequence[int], view: StageView) -> str:
     """Return the stage of one delivery. Files are named from where it lies, so that the folder moves as a whole."""
     space = made.delivery.space
     mesh = "usd" in made.delivery.meshes
-    lights = [_sun(one) for one in view.lights] + [_lamp(one, space.unit_m) for one in view.near]
+    names = identifiers([*(one.name for one in view.lights), *(one.name for one in view.near)])
+    lights = [
+        *map(_sun, view.lights, names),
+        *(_lamp(one, name, space.unit_m) for one, name in zip(view.near, names[len(view.lights) :], strict=True)),
+    ]
     return "\n".join(
         [
             "#usda 1.0",
@@ -141,12 +145,12 @@ def _card(made: Delivered, view: StageView) -> list[str]:
 def _mesh(made: Delivered) -> list[str]:
     return prim(
         f'def Mesh "mesh" (\n        prepend apiSchemas = ["MaterialBindingAPI"]\n        prepend references = '
-        f"@./{animation_name(made.clip)}@\n    )",
+        f"{asset(animation_name(made.clip))}\n    )",
         f"rel material:binding = <{MATERIAL}>",
     )
 
 
-def _sun(light: SeenLight) -> list[str]:
+def _sun(light: SeenLight, name: str) -> list[str]:
     """A distant light: it shines along its own -z; normalized, so that its strength is the light that arrives."""
     z = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
     x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.99 else [1.0, 0.0, 0.0], z)
@@ -154,7 +158,7 @@ def _sun(light: SeenLight) -> list[str]:
     turn = np.eye(4)
     turn[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     return prim(
-        f'def DistantLight "{identifier(light.name)}"',
+        f'def DistantLight "{name}"',
         "float inputs:angle = 0",
         "bool inputs:normalize = 1",
         _shine(light.colour, WHITE),
@@ -163,11 +167,11 @@ def _sun(light: SeenLight) -> list[str]:
     )
 
 
-def _lamp(light: Light, unit_m: float) -> list[str]:
+def _lamp(light: Light, name: str, unit_m: float) -> list[str]:
     """A near light: a point whose irradiance at one metre is the rig's; a normalized sphere gives strength / (4 d²)."""
     at = np.array(light.position_m, np.float64) / unit_m
     return prim(
-        f'def SphereLight "{identifier(light.name)}"',
+        f'def SphereLight "{name}"',
         f"float inputs:radius = {0.01 / unit_m:.9g}",
         "bool inputs:normalize = 1",
         "bool treatAsPoint = 1",

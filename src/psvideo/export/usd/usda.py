@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from itertools import chain, count
 
 import numpy as np
 
@@ -31,6 +32,30 @@ def numbers_of(values: Sequence[float] | FloatArray) -> str:
 def matrix_of(matrix: FloatArray) -> str:
     """Return a matrix as USD has it: rows are what the axes become, the last one the place."""
     return "(" + ", ".join(numbers_of(row) for row in np.asarray(matrix).T) + ")"
+
+
+def asset(path: str) -> str:
+    """Return a path to another file, from where the stage lies.
+
+    >>> asset("a.exr"), asset("a@b.exr")
+    ('@./a.exr@', '@@@./a@b.exr@@@')
+    """
+    mark = "@@@" if "@" in path else "@"
+    return f"{mark}./{path}{mark}"
+
+
+def identifiers(words: Sequence[str]) -> list[str]:
+    """Return words as prims beside each other may be called, no two alike.
+
+    >>> identifiers(["key 1", "key-1", "3"])
+    ['key_1', 'key_1_2', '_3']
+    """
+    names: list[str] = []
+    for word in words:
+        name = identifier(word)
+        candidates = chain([name], (f"{name}_{n}" for n in count(2)))
+        names.append(next(one for one in candidates if one not in names))
+    return names
 
 
 def identifier(word: str) -> str:

@@ -1,7 +1,6 @@
 """What lies beside the sequences of a finished run: movies for eyes, the timeline, and a note for a program."""
 
 import os
-import re
 import shutil
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from psvideo.clip import Clip
-from psvideo.clip.folder import number_of
+from psvideo.clip.folder import number_of, numbered_name
 from psvideo.compute.progress import Watch
 from psvideo.export.programs.blender_addon import ADDON_FILE, addon_zip
 from psvideo.export.programs.delivered import Delivered, SeenLight
@@ -84,15 +83,14 @@ def write_previews(
 
 
 def write_note(
-    run: Finished, delivery: Delivery, rig: Rig, *, first: int, last: int, metric: bool, caller: Caller
+    run: Finished, delivery: Delivery, rig: Rig, numbers: Sequence[int], *, metric: bool, caller: Caller
 ) -> None:
     """Write delivery.json; for a program how to load the delivery into it, in the caller's words, and what does that:
     a script for Nuke, an add-on for Blender."""
     clip = run.clip
     made = Delivered(
         clip=clip.name,
-        first=first,
-        last=last,
+        numbers=tuple(numbers),
         fps=run.fps,
         width_px=clip.width_px,
         height_px=clip.height_px,
@@ -115,8 +113,7 @@ def write_stage(run: Finished, delivery: Delivery, rig: Rig, instants: Mapping[i
     clip, numbers = run.clip, sorted(instants)
     made = Delivered(
         clip=clip.name,
-        first=numbers[0],
-        last=numbers[-1],
+        numbers=tuple(numbers),
         fps=run.fps,
         width_px=clip.width_px,
         height_px=clip.height_px,
@@ -207,13 +204,12 @@ def _footage(run: Finished) -> Footage:
         media: Images | str = quote(_relative(clip.files[0], run.target))
     else:
         first = clip.files[0]
-        digits = re.search(r"\d+$", first.stem)
-        written = digits.group() if digits else ""
+        prefix, written = numbered_name(first)
         media = Images(
             name=clip.name,
             folder=quote(_relative(first.parent, run.target)) + "/",
-            prefix=first.stem.removesuffix(written),
-            suffix=first.suffix,
+            prefix=prefix,
+            suffix=first.name.removeprefix(prefix + written),
             first=clip.numbers[0],
             count=frames,
             fps=fps,

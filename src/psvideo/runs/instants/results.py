@@ -154,4 +154,4 @@ def _hand_over(
     write_timeline(run)
     if delivery.program is not None or "usd" in delivery.meshes:
         write_stage(run, delivery, rig, {one.number: one.time_s for one in facts}, metric=metric)
-    write_note(run, delivery, rig, first=facts[0].number, last=facts[-1].number, metric=metric, caller=output.caller)
+    write_note(run, delivery, rig, [one.number for one in facts], metric=metric, caller=output.caller)
