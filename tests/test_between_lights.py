@@ -34,7 +34,7 @@ def cloth(light: int, right_px: float) -> np.ndarray:
 def sketch(light: int, time_s: float, right_px: float) -> Sketch:
     codes = cloth(light, right_px)
     blocks = codes.reshape(SHAPE[0] // 8, 8, SHAPE[1] // 8, 8).mean(axis=(1, 3)).astype(np.float32)
-    seen = np.ones(SHAPE[0], np.bool_)
+    seen = np.ones((SHAPE[0], 1), np.bool_)
     return Sketch(number=1, time_s=time_s, codes=codes, seen=seen, blocks=blocks, white=1.0)
 
 

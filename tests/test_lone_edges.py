@@ -89,7 +89,7 @@ def test_a_light_under_which_nothing_moves_speaks_on_the_grid_of_the_others() ->
         number=1,
         time_s=0.0,
         codes=codes,
-        seen=np.ones(ROWS, np.bool_),
+        seen=np.ones((ROWS, 1), np.bool_),
         blocks=np.zeros((ROWS // 4, COLS // 4), np.float32),
         white=0.7,
     )

@@ -26,7 +26,20 @@ from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.model.camera import Encoding
 from psvideo.model.rig import Rig
-from psvideo.model.turn import EXIF, of_matrix
+from psvideo.model.turn import CLOCKWISE, EXIF, UPRIGHT, Turn, of_matrix
+from psvideo.plates.align.as_they_are import seen_by_all
+from psvideo.plates.align.comb import SAMPLES
+from psvideo.plates.align.open_shutter import with_open_shutter
+from psvideo.plates.align.velocity.brightness import evened
+from psvideo.plates.align.velocity.flow import Sketch, changed, comparable, noise_between, sketch_of
+from psvideo.plates.align.velocity.followed import Followed, Pair
+from psvideo.plates.beauty import beauty_of, mix_of
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.plates.sequence import Round
+from psvideo.plates.upright import upright
+from psvideo.report.observe.facts import instant_facts
+from psvideo.report.observe.motion import glimpse, motion_between
 
 ONE = 65536
 MATRICES = {
@@ -139,12 +152,14 @@ def turned(vectors: NDArray[Any], matrix: tuple[int, ...]) -> Any:
     return tuple(float(value) for value in moved) if moved.ndim == 1 else moved
 
 
-def filmed(folder: Path, scene: str) -> Callable[[str], Path]:
-    """Shoot a scene; return what writes it as a movie that its container turns, with plan and rig beside it."""
+def filmed(folder: Path, scene: str, missing: int | None = None) -> Callable[[str], Path]:
+    """Shoot a scene; return what writes it as a movie that its container turns, with plan and rig beside it, and one
+    frame ``missing``."""
     (folder / "scene.toml").write_text(scene, encoding="utf-8")
     ps.shoot(folder / "scene.toml", folder / "shot")
     shot = open_clip(folder / "shot")
     codes = [np.rint(255 * np.clip(frame.image, 0, 1)).astype(np.uint8) for frame in read_frames(shot)]
+    codes = [frame for number, frame in enumerate(codes) if number != missing]
     plan = replace(shot.plan, camera=replace(shot.plan.camera, encoding=Encoding(transfer="linear")))
     rig = read_rig(folder / "shot" / "rig.toml", plan_lights=plan.lights)
 
@@ -233,6 +248,117 @@ def test_a_plan_of_the_upright_picture_is_refused_with_what_to_write(
 def test_info_says_how_a_movie_is_turned(film: Callable[[str], Path], capsys: pytest.CaptureFixture[str]) -> None:
     main(["info", str(film("clockwise"))])
     assert "turned by 90 degrees clockwise" in " ".join(capsys.readouterr().out.split())
+
+
+ROWS, COLS = 96, 128
+TURNS = pytest.mark.parametrize("turn", [UPRIGHT, EXIF[3], EXIF[5], CLOCKWISE], ids=str)
+
+
+def plate(
+    turn: Turn, unseen: slice, *, light: str = "key", image: NDArray[Any] | None = None, at: int = 0
+) -> LightPlate:
+    """A plate of which no frame saw some rows of the sensor, turned upright; left out, a picture of noise."""
+    if image is None:
+        image = 0.2 + 0.6 * np.random.default_rng(0).random((ROWS, COLS))
+    seen = np.ones(ROWS, np.bool_)
+    seen[unseen] = False
+    picture = mixture_of((image * seen[:, None]).astype(np.float32))
+    return upright(LightPlate(light=light, number=1001, time_s=0.1 * at, picture=picture, seen=seen), turn)
+
+
+def below(row: int) -> NDArray[np.bool_]:
+    """Where the sensor's picture is in this row or a later one."""
+    return np.broadcast_to(np.arange(ROWS)[:, None] >= row, (ROWS, COLS))
+
+
+@TURNS
+def test_of_a_turned_plate_as_many_rows_are_missing(turn: Turn) -> None:
+    one = plate(turn, slice(0, 32))
+    assert instant_facts(Round(number=1001, plates=(one,)), None, None).unseen_share == pytest.approx(1 / 3)
+    assert np.array_equal(np.broadcast_to(one.own, one.shape), turn.upright(below(32)))
+
+
+@TURNS
+def test_rows_that_no_frame_saw_are_no_motion(turn: Turn) -> None:
+    assert motion_between(glimpse(plate(turn, slice(0, 32))), glimpse(plate(turn, slice(32, 64), at=1))) is None
+
+
+@TURNS
+def test_rows_that_no_frame_saw_under_one_light_are_black_in_the_sum(turn: Turn) -> None:
+    even = np.full((ROWS, COLS), 0.3)
+    plates = plate(turn, slice(0, 20), image=even), plate(turn, slice(50, 70), light="left", image=even)
+    shown = beauty_of(Round(number=1001, plates=plates), mix_of({}, with_ambient=False)).image
+    known = np.ones((ROWS, COLS), np.bool_)
+    known[0:20] = known[50:70] = False
+    assert np.allclose(shown, turn.upright(np.where(known, 0.6, 0)), atol=1e-3)
+
+
+@TURNS
+def test_an_open_shutter_knows_nothing_of_rows_that_no_frame_saw(turn: Turn) -> None:
+    plates = [plate(turn, slice(0, 20), image=np.full((ROWS, COLS), 0.3 + 0.01 * n)) for n in range(SAMPLES)]
+    (one,) = with_open_shutter(Round(number=1001, plates=(each,)) for each in plates)
+    assert np.array_equal(one.open_plates[0].pixels_seen, plates[0].pixels_seen)
+    assert one.open_plates[0].pixels_seen.mean() == pytest.approx(76 / 96)
+
+
+def painted(turn: Turn, unseen: slice, *, right: int, gain: float = 1.0) -> Sketch:
+    """The sketch of a textured wall with a square that is so far to the right, with some noise."""
+    wall = 0.3 + 0.1 * np.random.default_rng(3).random((ROWS // 8, COLS // 8)).repeat(8, 0).repeat(8, 1)
+    wall[40:64, 40 + right : 64 + right] = 0.6
+    noise = np.random.default_rng(right).normal(0, 0.02, wall.shape)
+    return sketch_of(plate(turn, unseen, image=gain * (wall + noise), at=right), white=1.0)
+
+
+NOISE_CODES = np.sqrt(2) * 0.02 * 255 / (np.sqrt(1.02) - np.sqrt(0.02)) / (2 * np.sqrt(0.35 + 0.02))
+"""What that noise makes of the codes' differences on the wall, which shows about 0.35 of white: codes follow roots."""
+
+
+@TURNS
+def test_a_square_is_seen_to_move_though_rows_are_missing(turn: Turn) -> None:
+    before, after = painted(turn, slice(0, 16), right=0), painted(turn, slice(8, 20), right=12)
+    moved = changed(before, after)
+    left = np.pad(np.ones((4, 3), np.bool_), ((11, 9), (10, 19)))  # blocks of 4 pixels that the square leaves
+    assert moved[turn.upright(left)].all()
+    assert 0.05 < moved.mean() < 0.2
+    one, other = comparable(before, after)
+    missing = turn.upright(~below(20))
+    assert np.array_equal(one[missing], other[missing])
+    assert noise_between(before, after) == pytest.approx(NOISE_CODES, rel=0.25)
+
+
+@TURNS
+def test_a_change_of_exposure_is_evened_though_rows_are_missing(turn: Turn) -> None:
+    before, after = painted(turn, slice(0, 16), right=0), painted(turn, slice(8, 20), right=0, gain=0.7)
+    one, other = comparable(before, evened(before, after))
+    assert np.abs(one.astype(int) - other).max() <= 2
+    assert np.abs(before.codes.astype(int) - after.codes)[turn.upright(below(20))].mean() > 10
+
+
+@TURNS
+def test_what_all_lights_show_is_where_no_row_is_missing(turn: Turn) -> None:
+    parts = slice(0, 16), slice(15, 21)
+    pairs = [Pair(before=painted(turn, part, right=0), after=painted(turn, part, right=12)) for part in parts]
+    whole = turn.upright(below(22)[::2, ::2])
+    still = np.zeros_like(whole)
+    motion = Followed(time_s=0.0, velocity=np.zeros((2, *still.shape), np.float32), moves=still, rests=~still, step=2)
+    assert np.array_equal(np.broadcast_to(seen_by_all(pairs, motion), still.shape), whole)
+
+
+def test_a_turned_take_that_lost_a_frame_is_judged_as_the_upright_one(tmp_path: Path) -> None:
+    scene = SCENE.replace("shutter_deg = 300.0", "shutter_deg = 360.0").replace("frames = 14", "frames = 20")
+    movie = filmed(tmp_path, scene, missing=9)
+    plain, shown = (
+        ps.normals(movie(name), rig=movie(name).with_name("rig.toml"), out=tmp_path / f"{name} out")
+        for name in ("upright", "clockwise")
+    )
+    unseen = [one.unseen_share for one in plain.instants]
+    assert max(unseen) > 0.03
+    assert [one.unseen_share for one in shown.instants] == pytest.approx(unseen)
+    assert [(one.subject, one.grade) for one in shown.judgements] == [
+        (one.subject, one.grade) for one in plain.judgements
+    ]
+    for one, other in zip(shown.instants, plain.instants, strict=True):
+        assert one.valid_share == pytest.approx(other.valid_share, abs=0.03)
 
 
 REAL = {

@@ -68,5 +68,5 @@ def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightP
     known = [plate.seen if by_row else plate.pixels_seen for plate, _ in used]
     seen = np.all(known, axis=0) if used else np.ones(image.shape[0], np.bool_)
     for plate, _ in used:
-        image[~plate.rows_seen] = 0
+        image[~np.broadcast_to(plate.lines_seen, image.shape[:2])] = 0
     return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, picture=mixture_of(image), seen=seen)

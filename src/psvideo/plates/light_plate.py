@@ -19,7 +19,7 @@ class LightPlate:
     ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full. It
     is so bright at least, or ``unmixed``: a difference of flashes, of which one was clipped, and may be anything.
     ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
-    show ``time_s``.
+    show ``time_s``. ``sideways`` is a picture that was turned by a quarter: the sensor's rows are its columns.
     """
 
     light: str
@@ -30,6 +30,7 @@ class LightPlate:
     saturation: float = 1.0
     unmixed: bool = False
     shown_s: FloatArray | None = None
+    sideways: bool = False
 
     @property
     def image(self) -> Image:
@@ -52,13 +53,20 @@ class LightPlate:
         return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
 
     @property
+    def lines_seen(self) -> NDArray[np.bool_]:
+        """Which of the sensor's rows any frame saw, also where motion hid something in them: (row, 1), or (1, col)
+        where they are columns."""
+        if self.sideways:
+            return np.asarray(self.pixels_seen.any(axis=0))[None]
+        return self.rows_seen[:, None]
+
+    @property
     def own(self) -> NDArray[np.bool_]:
-        """What the plate's own flash showed, (row, 1), or (row, col) where the picture was turned; the rest comes from
-        flashes before or after."""
-        seen = self.rows_seen[:, None]
+        """What the plate's own flash showed, (row, 1), or (1, col) or (row, col) where the picture was turned; the rest
+        comes from flashes before or after."""
         if self.shown_s is None:
-            return seen
-        return np.asarray(seen & (self.shown_s == self.time_s).reshape(len(seen), -1))
+            return self.lines_seen
+        return np.asarray(self.lines_seen & (self.shown_s == self.time_s).reshape(self.shape[0], -1))
 
     @property
     def pixels_seen(self) -> NDArray[np.bool_]:

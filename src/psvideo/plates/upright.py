@@ -20,7 +20,8 @@ def upright(plate: LightPlate, turn: Turn) -> LightPlate:
     if turn.is_none:
         return plate
     picture = packed(mixture_of(turn.upright(plate.image)), plate.saturation)
-    return replace(plate, picture=picture, seen=_seen(plate, turn), shown_s=_shown_s(plate, turn))
+    sideways = plate.sideways != turn.transposed
+    return replace(plate, picture=picture, seen=_seen(plate, turn), shown_s=_shown_s(plate, turn), sideways=sideways)
 
 
 def _seen(plate: LightPlate, turn: Turn) -> NDArray[np.bool_]:

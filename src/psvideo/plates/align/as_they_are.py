@@ -18,7 +18,7 @@ from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.pixel_sources import Taken
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, SCALE, light_of
-from psvideo.plates.align.velocity.flow import TOE, Flags, comparable
+from psvideo.plates.align.velocity.flow import TOE, Flags, all_of, comparable
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving_kernel import AT_REST
 
@@ -109,10 +109,10 @@ def left_as_it_is(one: Taken, pair: Pair, motion: Followed, still: Flags) -> Tak
 
 
 def seen_by_all(pairs: Sequence[Pair], motion: Followed) -> Flags:
-    """Return which rows of the velocities the nearer plates of all lights show, (row, 1)."""
-    seen = np.ones(motion.moves.shape[0], np.bool_)
+    """Return which of the velocities' pixels the nearer plates of all lights show, (row, 1), or (row, col) where the
+    picture was turned."""
+    seen = np.ones((motion.moves.shape[0], 1), np.bool_)
     for pair in pairs:
         since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
-        rows = (pair.before if since_s <= until_s else pair.after).seen
-        seen &= rows[: motion.step * len(seen)].reshape(len(seen), -1).all(axis=1)
-    return seen[:, None]
+        seen = seen & all_of((pair.before if since_s <= until_s else pair.after).seen, motion.step)
+    return seen

@@ -90,13 +90,15 @@ def plate_at(
         seen=seen,
         saturation=own.saturation,
         shown_s=own.flashed_s,
+        sideways=own.sideways,
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Side:
     """A plate, of whose picture only those rows are made that move into a band, what it counts where both plates are
-    taken, and what lies well within what was seen, by rows, (row, 1), or by pixels; (1, 1) where that is everywhere."""
+    taken, and what lies well within what was seen, by rows, (row, 1) or (1, col), or by pixels; (1, 1) where that is
+    everywhere."""
 
     plate: LightPlate
     read: Reader

@@ -69,7 +69,7 @@ class _Sum:
 
 def _weight(plate: LightPlate) -> NDArray[np.float32]:
     known = np.where(plate.pixels_seen, np.float32(1), np.float32(GUESSED))
-    return np.asarray(known * plate.rows_seen[:, None], np.float32)
+    return np.asarray(known * plate.lines_seen, np.float32)
 
 
 def _like(weight: NDArray[np.float32], plate: LightPlate) -> NDArray[np.float32]:

@@ -114,7 +114,7 @@ def instant_facts(
         valid_share=valid,
         measured_share=measured,
         clipped_share=float(np.mean(shares)),
-        unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
+        unseen_share=float(np.mean([1 - plate.lines_seen.mean() for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
         change=change,
         levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
@@ -144,8 +144,10 @@ def _borrowed(plate: LightPlate) -> float:
     """Return the share of a plate's rows that come from another round: half a round away and more."""
     if plate.shown_s is None:
         return 0.0
-    times_s, counts = np.unique(plate.shown_s[plate.rows_seen], return_counts=True)
-    return float(1 - counts[np.abs(times_s - plate.time_s).argmin()] / plate.shown_s.size) if len(times_s) > 1 else 0.0
+    shown_s, seen = np.broadcast_arrays(plate.shown_s.reshape(plate.shape[0], -1), plate.lines_seen)
+    times_s, counts = np.unique(shown_s[seen], return_counts=True)
+    own = counts[np.abs(times_s - plate.time_s).argmin()] if len(counts) else 0
+    return float((counts.sum() - own) / shown_s.size)
 
 
 def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:

@@ -71,7 +71,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     light = np.clip(grey / np.float32(white), 0, 1) + np.float32(TOE)
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
-    whole = bool(plate.rows_seen.all())
+    whole = bool(plate.lines_seen.all())
     scale_px = plate.shape[1] / grey.shape[1]
     filled = coarser(filled_of(plate, chosen), 1, step)
     return Glimpse(codes=codes, scale=scale_px, time_s=plate.time_s, white=white, seen=whole, filled=filled)

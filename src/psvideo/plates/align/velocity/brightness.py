@@ -29,8 +29,12 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     Both sketches are of one light and one scale. What moves changes few blocks by one factor, so that the median over
     all lit blocks gives the exposure, and motion is left to be found.
     """
-    rows = np.linspace(0, len(before.seen) - 1, len(before.blocks)).astype(np.intp)
-    seen = (before.seen & after.seen)[rows]
+    both = before.seen & after.seen
+    rows, cols = (
+        np.linspace(0, pixels - 1, blocks).astype(np.intp)
+        for pixels, blocks in zip(both.shape, before.blocks.shape, strict=True)
+    )
+    seen = both[np.ix_(rows, cols)]
     one, other = before.blocks[seen], after.blocks[seen]
     lit = (np.minimum(one, other) > LIT) & (np.maximum(one, other) < NEAR_WHITE)
     if np.count_nonzero(lit) < FEWEST:

@@ -51,9 +51,9 @@ QUARTER_OF_NORMAL = 0.3186
 
 @dataclass(frozen=True, kw_only=True)
 class Sketch:
-    """A plate as flow sees it: ``codes`` (row, col), which of these rows any frame saw, ``seen`` (row,), and the means
-    of blocks of codes, ``blocks`` (row, col). ``white`` is the light of code 255, and ``filled`` where codes say
-    nothing."""
+    """A plate as flow sees it: ``codes`` (row, col), which of these any frame saw, ``seen`` (row, 1), or (row, col)
+    where the picture was turned, and the means of blocks of codes, ``blocks`` (row, col). ``white`` is the light of
+    code 255, and ``filled`` where codes say nothing."""
 
     number: int
     time_s: float
@@ -73,9 +73,10 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     """Return what flow needs of a plate: a few hundred kilobytes; ``white`` becomes code 255."""
     rows, cols = plate.shape[:2]
     halved = rows * cols > LARGEST_PX
-    seen, grey = plate.seen, plate.picture.halved() if halved else _grey(plate.image)
+    grey = plate.picture.halved() if halved else _grey(plate.image)
+    seen = plate.seen if plate.seen.ndim == 2 else plate.seen[:, None]
     if halved:
-        seen = np.asarray(seen[: rows // 2 * 2].reshape(-1, 2).all(axis=1))
+        seen = all_of(seen, 2)
     shown: Vectors = np.empty(grey.shape[:2], np.float32)
     codes: Codes = np.empty(grey.shape[:2], np.uint8)
     root = float(np.sqrt(TOE))
@@ -90,6 +91,18 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     )
 
 
+def all_of(seen: Flags, step: int) -> Flags:
+    """Return where all of ``step`` by ``step`` pixels were seen, of rows, (row, 1), or of pixels, (row, col); what is
+    left over at the ends goes.
+
+    >>> all_of(np.array([[True], [True], [True], [False], [True]]), 2).tolist()
+    [[True], [False]]
+    """
+    wide = step if seen.shape[1] > 1 else 1
+    rows, cols = seen.shape[0] // step, seen.shape[1] // wide
+    return np.asarray(seen[: rows * step, : cols * wide].reshape(rows, step, cols, wide).all(axis=(1, 3)))
+
+
 def _grey(image: Image) -> Image:
     if image.ndim == 2:
         return image
@@ -97,13 +110,13 @@ def _grey(image: Image) -> Image:
 
 
 def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
-    """Return the codes of both; a row that one of them lacks shows the same in both, and so does not seem to move, nor
-    does what is filled."""
+    """Return the codes of both; what no frame saw for one of them shows the same in both, and so does not seem to move,
+    nor does what is filled."""
     one, other = before.codes, after.codes
     if not before.seen.all():
-        one = np.where(before.seen[:, None], one, other)
+        one = np.where(before.seen, one, other)
     if not after.seen.all():
-        other = np.where(after.seen[:, None], other, one)
+        other = np.where(after.seen, other, one)
     if (vague := vague_between(before.filled, after.filled)) is not None:
         other = np.where(vague, one, other)
     return one, other
@@ -113,10 +126,11 @@ def changed(before: Sketch, after: Sketch) -> Flags:
     """Return where anything changed between two sketches by more than noise does, by block, (row, col); quick, and
     rather yes than no."""
     change = after.blocks - before.blocks
-    rows_seen = before.seen & after.seen
-    if not rows_seen.all():
-        shown = cv2.resize(rows_seen[:, None].astype(np.float32), (1, len(change)), interpolation=cv2.INTER_AREA)
-        change[shown[:, 0] < 1] = 0
+    seen = before.seen & after.seen
+    if not seen.all():
+        size = change.shape[1] if seen.shape[1] > 1 else 1, change.shape[0]
+        shown = cv2.resize(seen.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        change[np.broadcast_to(shown < 1, change.shape)] = 0
     if (vague := vague_between(before.filled, after.filled)) is not None:
         hidden = cv2.resize(vague.astype(np.float32), change.shape[::-1], interpolation=cv2.INTER_AREA)
         change[hidden > 0] = 0
@@ -130,10 +144,10 @@ def noise_between(before: Sketch, after: Sketch) -> float:
 
     The quieter half decides: up to half of what is lit may move and be as rich in detail as it likes.
     """
-    some = np.flatnonzero(before.seen & after.seen)[::SOME]
+    seen = before.seen & after.seen
+    some = np.flatnonzero(seen.any(axis=1))[::SOME]
     one, other = (sketch.codes[some].astype(np.int16) for sketch in (before, after))
-    change = other - one
-    return _spread(change, one)
+    return _spread(other - one, np.where(seen[some], one, 0))
 
 
 def _spread(change: NDArray[Any], shown: NDArray[Any], step: int = 1) -> float:
