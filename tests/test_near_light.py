@@ -19,7 +19,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.irradiance.near_light import near_field, near_vectors
 from psvideo.model.rig import Light, Rig
-from psvideo.model.surface import Surface
+from psvideo.model.surface import Misfit, Surface
 from psvideo.solve import near_surface
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.falloff_costs import around, falloff_costs, for_pixels
@@ -30,8 +30,12 @@ from psvideo.solve.normals.loops.near_kernel import place_lights
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Floats, Near
-from psvideo.solve.normals.trust.near_spread import near_spread
+from psvideo.solve.normals.trust.judging import Judging
+from psvideo.solve.normals.trust.judging import _typical as typical
+from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.sweeping import RATIOS, swept
+from psvideo.solve.sweeping import _costs as swept_costs
 from psvideo.solve.sweeping import _unsure as doubted
 
 Array = NDArray[np.float64]
@@ -535,3 +539,43 @@ def test_the_error_of_a_far_wall_does_not_hang_on_what_stands_in_the_middle_of_t
         return float(np.median(found.error_deg[: SIZE // 4]))
 
     assert claimed_deg(before) == pytest.approx(claimed_deg(far), rel=0.02)
+
+
+@pytest.mark.parametrize(("noise", "least", "most"), [(0.0003, 0.0, 0.1), (0.003, 0.3, 0.7)])
+def test_a_distance_that_nobody_knows_is_not_laid_upon_a_matte_surface(noise: float, least: float, most: float) -> None:
+    points, normals = surface(room)
+    rig, rng = ring_rig(8, 2), np.random.default_rng(5)
+    plates = [plate + rng.normal(0, noise, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    found = ps.solve_images(np.stack(plates), rig).misfit
+    assert found is not None
+    assert least < found.distance_share + 1e-6 < most
+    assert found.error_deg < 1
+
+
+def test_what_is_typical_is_that_of_places_whose_distance_is_known() -> None:
+    whole, none = np.ones((8, 10), np.float32), np.zeros((8, 10), np.float32)
+    normals = np.broadcast_to(np.array([0, 0, 1], np.float32), (8, 10, 3))
+    one = Surface(normals=normals, albedo=whole, valid=whole > 0)
+    points = ThinSurface(step=1, surface=one, noise_deg=none, fit_deg=none, fit_of_noise_deg=none)
+    doubt_deg, errors_deg = none.copy(), whole.copy()
+    doubt_deg[:, :4], errors_deg[:, :4] = 6, 20
+
+    def found(limit_deg: float) -> Misfit:
+        near, how = NearSpread(dim=whole, wider=whole, doubt_deg=doubt_deg), Judging(most_error_deg=limit_deg)
+        return typical(Misfit(share=0.01, error_deg=9.0), points, errors_deg, none, near, how)
+
+    assert (found(5).error_deg, found(5).distance_share) == pytest.approx((1.0, 0.4))
+    assert (found(7).error_deg, found(7).distance_share) == pytest.approx((0.4 * 20 + 0.6, 0.0))
+
+
+def test_where_a_shadow_ends_says_little_of_the_distance_around_it() -> None:
+    """Half of a light's own light is explained by no distance, and drowned what the points beside it say."""
+    rig = ring_rig(6, 2)
+    v, u = np.mgrid[:SIZE, :SIZE].astype(float)
+    points = np.full((SIZE, SIZE, 1), 1.3 * FAR_M) * rays(u, v)
+    light = np.stack(filmed(rig, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape)), axis=-1).astype(np.float64)
+    light[:, SIZE // 2, 0] /= 2
+    ground = ground_of(rig, height_px=SIZE, width_px=SIZE)
+    costs, _ = swept_costs(ground, rig.lights, light, ground.depth_m.astype(np.float64), 1, noise=1e-4)
+    beside, away = (costs[:, SIZE // 4, col].min() for col in (SIZE // 2 + 1, SIZE // 4))
+    assert beside < away + 0.1

@@ -903,3 +903,16 @@ def test_lights_that_were_never_seen_are_not_said_to_fire() -> None:
                                   unseen_share=0.1 if number else 0.0))  # fmt: skip
     (line,) = lamps(one)
     assert line.found == "The 2 of 3 lights that were seen fire; the weakest gives 0.0 stops less than the strongest."
+
+
+@pytest.mark.parametrize(("share", "grades"), [(0.09, []), (0.11, ["doubtful"])])
+def test_what_is_not_known_of_near_lights_distance_is_said_and_not_laid_upon_the_surface(
+    share: float, grades: list[str]
+) -> None:
+    one = Footage().observed(0)
+    misfit = Misfit(share=0.01, error_deg=1.0, distance_share=share)
+    one.facts = KeptFacts(replace(facts, misfit=misfit, valid_share=0.4, measured_share=1.0) for facts in one.facts)
+    assert [line.grade for line in result.distance(one)] == grades
+    (lacking,) = validity(one)
+    assert ("line on distance" in lacking.advice) is bool(grades)
+    assert [line.grade for line in accuracy(one)] == ["good"]

@@ -45,12 +45,15 @@ class Misfit:
         takes it for less than 0.3 %.
     error_deg: the normal's predicted standard error there, without what noise makes of it.
     noise_deg: what noise makes of it.
+    distance_share: the share of the subject where near lights' distance is known so little that a normal may be turned
+        too far for it to be trusted; such places say nothing of ``error_deg``.
     reflectance: what the subject shows beyond n . l, None where that explains little.
     """
 
     share: float
     error_deg: float
     noise_deg: float = 0.0
+    distance_share: float = 0.0
     reflectance: Reflectance | None = None
 
 

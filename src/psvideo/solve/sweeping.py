@@ -29,6 +29,8 @@ RATIOS = np.geomspace(0.5, 2.5, 25)
 """Of the plane's distance, 7 % apart; between them a parabola is laid."""
 AROUND = 5
 """Costs are averaged over squares of this many points."""
+EDGE = 4.0
+"""Where a shadow ends no distance explains the light of a point: its best cost, squared, counts so much against it."""
 STAY = 0.05
 """The cost of standing off the plane by a factor e, squared; little beside what tells one distance from another."""
 LEAST_GAIN = 0.005
@@ -140,8 +142,9 @@ def _costs(
     costs = falloff_costs(ground, lights, light, plane_m, RATIOS, at=every, step=step, noise=noise)
     planes = costs.reshape(len(RATIOS), *plane_m.shape)
     reached = planes[0] > 0
-    known = cv2.blur(reached.astype(np.float64), (AROUND, AROUND))
-    each = [np.asarray(cv2.blur(plane, (AROUND, AROUND))) for plane in planes]
+    sound = reached / (1 + EDGE * planes.min(axis=0) ** 2)
+    known = cv2.blur(sound, (AROUND, AROUND))
+    each = [np.asarray(cv2.blur(plane * sound, (AROUND, AROUND))) for plane in planes]
     return np.stack(each) / np.maximum(known, 1e-9), reached
 
 

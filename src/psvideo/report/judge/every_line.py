@@ -10,7 +10,7 @@ from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
 from psvideo.report.judge.of_timing import timing_and_order
-from psvideo.report.judge.result import accuracy, focus, steadiness, validity
+from psvideo.report.judge.result import accuracy, distance, focus, steadiness, validity
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
@@ -42,6 +42,7 @@ def judgements(
         focus(observed),
         *rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt),
         *accuracy(observed),
+        *distance(observed),
         *validity(observed, curve_doubted=bool(curve_doubt)),
         *steadiness(observed.facts),
     )

@@ -28,6 +28,8 @@ NOT_MATTE = 0.1
 HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
+UNKNOWN_DISTANCE = 0.1
+"""From this share of the subject on, what is not known of near lights' distance is said: it costs as many normals."""
 MOVING_FACTOR = 2.0
 """Where the picture moves, this many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
@@ -118,6 +120,8 @@ def _trusting(observed: Observed) -> str:
     said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
     if said and noise_deg < LITTLE_NOISE_DEG:
         return "More light does not help; the line on the typical error says what does."
+    if next(distance(observed), None) is not None:
+        return "More lights help, and a depth that is known; the line on distance says why."
     return "Give more light, or use more lights" + (
         "." if said else '; `aov=["error"]` says how far off each pixel may be.'
     )
@@ -169,6 +173,21 @@ def _why_off(observed: Observed) -> tuple[str, str]:
         "the surface is not quite matte, or light comes by way of others (gloss, creases, soft shadows)",
         "More lights, far apart, average it out",
     )
+
+
+def distance(observed: Observed) -> Iterator[Judgement]:
+    """Judge how much of the subject lies where near lights' distance is not known, which is no fault of its surface."""
+    known = [one.misfit.distance_share for one in observed.facts if one.misfit is not None]
+    share = float(np.median(known)) if known else 0.0
+    if share > UNKNOWN_DISTANCE:
+        yield Judgement(
+            subject="distance",
+            grade="doubtful",
+            found=f"The lights are near, and in {100 * share:.0f} % of the subject their light does not say how far "
+            "away it is (in shadow beside what stands before it, where few lights reach, or where it is dim): the "
+            "distance is a guess there, and normals may be turned too far to be trusted.",
+            advice="Give a depth that is known (`depth`), place the lights farther away, or use more of them.",
+        )
 
 
 def _solved(facts: Sequence[InstantFacts]) -> bool:

@@ -9,7 +9,7 @@ from psvideo.model.surface import Misfit, Reflectance
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.steadiness import Change
 
-_FIXED = Struct("=qI15d")
+_FIXED = Struct("=qI16d")
 """A round's number, of how many lights there are levels, and what it has one number for; NaN is what is not known."""
 
 
@@ -60,9 +60,10 @@ def _packed(one: InstantFacts) -> bytes:
     change = (nan, nan, nan)
     if one.change is not None:
         change = (one.change.normals_deg, one.change.albedo_percent, one.change.level_percent)
-    misfit = (nan, nan, nan)
+    misfit = (nan, nan, nan, nan)
     if one.misfit is not None:
-        misfit = (one.misfit.share, one.misfit.error_deg, one.misfit.noise_deg)
+        found = one.misfit
+        misfit = (found.share, found.error_deg, found.noise_deg, found.distance_share)
     known = (one.valid_share, one.ambient, one.speed_px_s, one.moving_share, one.measured_share)
     fixed = _FIXED.pack(
         one.number,
@@ -103,5 +104,11 @@ def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
         moving_share=moving,
         misfit=None
         if isnan(misfit[0])
-        else Misfit(share=misfit[0], error_deg=misfit[1], noise_deg=misfit[2], reflectance=shared.reflectance),
+        else Misfit(
+            share=misfit[0],
+            error_deg=misfit[1],
+            noise_deg=misfit[2],
+            distance_share=misfit[3],
+            reflectance=shared.reflectance,
+        ),
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for, thin
 from psvideo.compute.threads import over_ranges
-from psvideo.model.surface import MEASURED, Surface
+from psvideo.model.surface import MEASURED, Misfit, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise
@@ -77,10 +77,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit
     if misfit is not None and points.known.any():
-        albedo = points.brightness * points.known  # what is bright shows more of the subject
-        typical, by_noise = (_usual(each, albedo) for each in (at_points, np.hypot(points.noise_deg, signs.lost_deg)))
-        beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
-        misfit = replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
+        misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, signs.lost_deg), near, how)
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, usual])
@@ -110,6 +107,25 @@ def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: J
 
     over_ranges(add, rows, each=BAND_PIXELS // cols)
     return surface
+
+
+def _typical(
+    misfit: Misfit, points: ThinSurface, at_points: Floats, by_noise_deg: Floats, near: NearSpread, how: Judging
+) -> Misfit:
+    """Return the misfit with what is typical of the points' errors, as far as distances are known."""
+    albedo = points.brightness * points.known  # what is bright shows more of the subject
+    unknown = np.zeros_like(points.known)
+    if near.doubt_deg.size:
+        unknown = points.known & (near.doubt_deg > how.most_error_deg)
+    if not unknown.all(where=points.known):
+        albedo = albedo * ~unknown
+    typical, by_noise = (_usual(each, albedo) for each in (at_points, by_noise_deg))
+    return replace(
+        misfit,
+        error_deg=float(np.sqrt(max(typical**2 - by_noise**2, 0.0))),
+        noise_deg=by_noise,
+        distance_share=float(np.count_nonzero(unknown) / np.count_nonzero(points.known)),
+    )
 
 
 def _usual(errors_deg: Floats, weights: Floats) -> float:
