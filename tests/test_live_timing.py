@@ -232,3 +232,66 @@ def test_names_that_a_marker_shows_are_no_guess_however_often_the_strobe_is_foun
     assert len(chain.followed) == 2
     assert order_of(chain.followed) == "marker"
     assert not guess_words(chain.followed, first_light=None)
+
+
+def is_lost_and_found_again(plan: Plan, again: TrueClock, *, missing: int) -> None:
+    """Frames are missing, then the strobe starts again: nothing of either is taken for the other."""
+    period_s = plan.camera.frame_period_s
+    before, after = shoot(plan, frames=110), shoot(plan, frames=120, clock=again)
+    chain = taken(Chain(plan=plan), [*before.frames[:80], *before.frames[80 + missing :], *after.frames])
+    assert chain.state == "locked"
+    assert len(chain.followed) == 2
+    assert chain.lost_frames == missing
+    holes = [hole for one in chain.followed for hole in one.holes]
+    assert holes == ([Hole(before=80, count=missing)] if missing else [])
+    timing = timing_of(chain.followed, clip="clip")
+    whole = replace(timing, flashes=tuple(one for one in timing.flashes if one.complete))
+    true_s = [flash.start_s for flash in before.flashes if flash.start_s < 111 * period_s]
+    true_s += [flash.start_s + 110 * period_s for flash in after.flashes]
+    assert sum(one.start_s > 112 * period_s for one in whole.flashes) > 60
+    assert np.abs(apart_rows(whole, np.array(true_s), plan)).max() < LIVE_ROWS
+
+
+@pytest.mark.parametrize(("missing", "rows"), [(18, 0.6), (8, -0.2), (16, 0.4)])
+def test_a_strobe_that_was_started_again_where_missing_frames_nearly_explain_it_is_lost_and_found_again(
+    make_plan: PlanMaker, missing: int, rows: float
+) -> None:
+    """It starts again within a row of where it was to be some frames later."""
+    plan = make_plan(width_px=8, height_px=96)
+    went_on_s = 0.0123 - (110 + missing) * plan.camera.frame_period_s + rows * plan.camera.row_time_s
+    clock = TrueClock(phase_s=went_on_s % (plan.cycle_s * (1 + 30e-6)), offset_ppm=30.0)
+    is_lost_and_found_again(plan, clock, missing=2)
+
+
+@pytest.mark.parametrize(
+    ("lights", "clock", "missing"),
+    [
+        (3, TrueClock(phase_s=0.00959367, offset_ppm=30.04), 1),
+        (3, TrueClock(phase_s=0.02754083, offset_ppm=-42.25), 4),
+        (4, TrueClock(phase_s=0.00879599, offset_ppm=23.04), 0),
+    ],
+    ids=["six rows off", "fitted brightnesses explain it", "a hole is taken back"],
+)
+def test_a_strobe_that_was_started_again_is_not_the_one_from_before_though_its_flashes_lie_near(
+    make_plan: PlanMaker, lights: int, clock: TrueClock, missing: int
+) -> None:
+    plan = make_plan(lights=("key", "left", "right", "top")[:lights], width_px=8, height_px=96)
+    is_lost_and_found_again(plan, clock, missing=missing)
+
+
+@pytest.mark.parametrize("covered", [30, 60, 200])
+def test_a_lens_that_is_covered_for_a_while_is_looked_through_again_with_one_lock(
+    make_plan: PlanMaker, covered: int
+) -> None:
+    """What was found in frames that show the strobe no more is no lock: else one follows the other, every frame."""
+    plan = make_plan(lights=("key", "left", "right", "top"), width_px=8, height_px=96)
+    shot = shoot(plan, frames=200 + covered)
+    shape = plan.camera.height_px, plan.camera.width_px
+    dark = np.random.default_rng(1).normal(0, 1e-4, (covered, *shape)).astype(np.float32)
+    chain = taken(Chain(plan=plan), [*shot.frames[:100], *dark, *shot.frames[100 + covered :]])
+    assert chain.state == "locked"
+    assert chain.lost_frames == 0
+    assert len(chain.followed) <= 2
+    timing = timing_of(chain.followed, clip="clip")
+    assert sum(one.start_s > (100 + covered) * plan.camera.frame_period_s for one in timing.flashes) > 50
+    assert np.abs(apart_rows(timing, np.array([flash.start_s for flash in shot.flashes]), plan)).max() < LIVE_ROWS

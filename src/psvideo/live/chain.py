@@ -209,15 +209,16 @@ class Chain:
     def _follow(self, index: int, mean: FloatArray, doubt: FloatArray | None) -> int:
         follower = self.follower
         assert follower is not None  # noqa: S101
-        holes, before = len(follower.holes), follower.state
+        extra, before = follower.extra, follower.state
         place = follower.add(index, mean, doubt)
-        for hole in follower.holes[holes:]:
-            self.lost_frames += hole.count
-            first = hole.before + follower.extra - hole.count
-            if self._ring is not None:
-                self._ring.moved({at: at + hole.count if at >= first else at for at in self._ring.frames})
+        later = follower.extra - extra
+        self.lost_frames += later
+        if later and self._ring is not None:
+            first = follower.holes[-1].before + extra if later > 0 else follower.doubted_from or 0
+            self._ring.moved({at: at + later if at >= first else at for at in self._ring.frames})
         if follower.state == "lost" and before != "lost":
-            self._wanted = index + frames_to_lock(self.plan) - LATEST
+            odd = index - LATEST if follower.doubted_from is None else follower.doubted_from - follower.extra - 1
+            self._wanted = odd + frames_to_lock(self.plan)
         return place
 
     def _look(self) -> None:
@@ -250,10 +251,8 @@ class Chain:
         with self._guard:
             self._idle.set()
             if isinstance(found, str):
-                self.why = found
-                self._wanted = (self._last or 0) + frames_to_lock(self.plan) // 2
+                self._look_later(found)
                 return
-            self.why = ""
             known = [one for one in self._pending if index[0] <= one[0] <= index[-1]]
             later = [one for one in self._pending if one[0] > index[-1]]
             numbers = index.tolist()
@@ -262,6 +261,10 @@ class Chain:
             )
             for number, mean, doubt in later:
                 follower.add(number, mean, doubt)
+            if follower.state != "locked":
+                self._look_later("The strobe was found, and gone again before it could be followed.")
+                return
+            self.why = ""
             for before in self.followed:  # what it took for missing in the frames that were searched is known better
                 self.lost_frames -= before.missing_before(self._last or 0) - before.missing_before(numbers[0])
                 before.holes[:] = [hole for hole in before.holes if hole.before <= numbers[0]]
@@ -273,6 +276,10 @@ class Chain:
                 self._ring.moved({number: number + follower.missing_before(number) for number in taken})
             elif self._ring is not None:
                 self._ring.frames.clear()
+
+    def _look_later(self, why: str) -> None:
+        self.why = why
+        self._wanted = (self._last or 0) + frames_to_lock(self.plan) // 2
 
 
 FIRST = LiveRounds.number

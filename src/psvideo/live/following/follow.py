@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from psvideo.live.following.foretold import shift_of
 from psvideo.live.following.lock import Lock
 from psvideo.live.following.phase_filter import Measured, PhaseFilter, started
 from psvideo.live.following.trims import Trims, trimmed
@@ -39,6 +40,9 @@ LEFT, LEFT_AFTER_CHANGE, SLOWLY = 0.6, 0.85, 8
 likely to be another one; the more so after a change, as a strobe that was started again is one."""
 HELD = 0.33
 """A correction moves the clock by no more than this share of a flash."""
+ASTRAY, LEAST_ASTRAY_ROWS = 8.0, 0.1
+"""A strobe that stands by more standard errors, and more rows, from where its clock has it is another one: one that was
+started again. Where frames are missing it stands within 2 errors, else hardly ever within 15."""
 STEP_COST = 0.02
 """What every frame that is taken for missing costs, in mean losses of a frame: cycles may look alike."""
 
@@ -56,7 +60,8 @@ class Follower:
     """Follows one lock. ``extra`` is by how many frames the picture says that frames come later than numbered.
 
     ``measured`` is what windows of frames said of the clock, against the lock's own, ``span`` the places in time of the
-    first and the last frame that were followed.
+    first and the last frame that were followed; ``doubted_from`` is the place from which it is not known whether they
+    show this strobe, None while it is locked.
     """
 
     plan: Plan
@@ -67,6 +72,7 @@ class Follower:
     state: State = "locked"
     extra: int = 0
     span: tuple[int, int] | None = None
+    doubted_from: int | None = None
     holes: list[Hole] = field(default_factory=list)
     measured: list[Measured] = field(default_factory=list)
     trims: Trims = field(default_factory=Trims)
@@ -87,8 +93,11 @@ class Follower:
     def error_rows(self) -> float:
         """The standard error of the flashes' times at the latest frame, in rows."""
         at_s = self.phase.at_s if self.span is None else self.span[1] * self.window.period_s
-        row_time_s = self.beat.row_time_s or self.window.period_s / self.plan.camera.height_px
-        return self.phase.error_at_s(at_s) / row_time_s
+        return self.phase.error_at_s(at_s) / self._row_s
+
+    @property
+    def _row_s(self) -> float:
+        return self.beat.row_time_s or self.window.period_s / self.plan.camera.height_px
 
     def missing_before(self, number: int) -> int:
         """Return how many frames were found missing before a numbered one."""
@@ -136,7 +145,37 @@ class Follower:
             self._odd = []
         elif not self.window.changes or first - self.window.changes[-1] > EVERY:
             self.window.changes.append(first)
-            self.state = "unsure"
+            self._doubt(first)
+
+    def _doubt(self, first: int) -> None:
+        """Be not sure of the strobe from a place on, where that was not doubted before."""
+        self.state = "unsure"
+        self.doubted_from = first if self.doubted_from is None else self.doubted_from
+
+    def _no_hole(self) -> bool:
+        """Return whether the last hole is none, and lose the strobe then: behind it another one was started."""
+        if not self.holes or self._light is None:
+            return False
+        hole = self.holes[-1]
+        first = hole.before + self.extra
+        since = sum(frame.index >= first for frame in self.window.frames)
+        if not EVERY <= since < len(self.window.frames) or not self._is_astray(since):
+            return False
+        self.holes.pop()
+        self.extra -= hole.count
+        self.window.moved(first, -hole.count)
+        self.span = (self.span or (0, 0))[0], self.window.frames[-1].index
+        self.state, self.doubted_from = "lost", first - hole.count
+        return True
+
+    def _is_astray(self, latest: int) -> bool:
+        """Return whether the strobe in the last frames stands elsewhere than its clock foretold."""
+        assert self._learnt is not None  # noqa: S101
+        assert self._light is not None  # noqa: S101
+        rows, beat = self.window.profiles(latest), replace(self.beat, clock=self.clock)
+        shift_s, error_s = shift_of(self.plan, rows, beat, learnt=self._learnt, light=self._light)
+        error_s = float(np.hypot(error_s, self.phase.error_at_s(float(rows.frame_start_s.mean()))))
+        return abs(shift_s) > max(ASTRAY * error_s, LEAST_ASTRAY_ROWS * self._row_s)
 
     def _missing(self, frames: Profiles) -> int:
         """Return how many frames are missing before some that were not predicted, 0 where that explains nothing."""
@@ -153,6 +192,8 @@ class Follower:
     def _correct(self) -> None:
         """Move the clock by what the latest frames leave, and judge whether the strobe is still seen in them."""
         new, self._fresh = self._fresh, 0
+        if self._no_hole():
+            return
         rows, beat = self.window.profiles(), replace(self.beat, clock=self.clock)
         rest = unexplained(self.plan, rows, beat)
         self._judge(rows, rest)
@@ -173,19 +214,29 @@ class Follower:
             return
         latest = rows.take(slice(len(rows.value) - LATEST, len(rows.value)))
         self.share = gain_of(latest, rest[-LATEST:])
-        left = LEFT_AFTER_CHANGE if self.state == "unsure" else LEFT
+        left = LEFT if self.state == "locked" else LEFT_AFTER_CHANGE
         least = max(MIN_GAIN, left * self._usual_share)
         good = self.share > least and explained(latest, rest[-LATEST:]) > MIN_EXPLAINED
-        if good and (self.state != "lost" or self.share > GOOD_SEED):
-            self.state = "locked"
+        if good and (self.state == "locked" or not self._is_another()):
+            self.state, self.doubted_from = "locked", None
             self._usual_share += (self.share - self._usual_share) / SLOWLY
+        elif self.state == "locked":
+            self._doubt(int(latest.index[0]))
         else:
-            self.state = "unsure" if self.state == "locked" else "lost"
+            self.state = "lost"
+
+    def _is_another(self) -> bool:
+        """Return whether what is seen after a doubt is not the strobe from before it, as far as is known yet."""
+        begins = self.window.frames[-LATEST].index
+        if self.state == "lost" and (self.share <= GOOD_SEED or begins < (self.doubted_from or 0)):
+            return True
+        return self._light is not None and self._is_astray(LATEST)
 
     def _learn(self, rows: Profiles) -> None:
-        """Fit brightnesses to the frames since the light last changed, once these show every light."""
+        """Fit brightnesses to the frames since the light last changed, once these show every light; not to frames that
+        may show another strobe, for what is fitted to them explains them."""
         known = self.window.since_change()
-        if known < LATEST and self._light is not None:
+        if self._light is not None and (known < LATEST or self.state != "locked"):
             return
         learnt = rows.take(slice(len(rows.value) - known, len(rows.value))).one_window()
         beat = replace(self.beat, clock=self.clock)

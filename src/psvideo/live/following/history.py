@@ -41,7 +41,8 @@ def timing_of(
         if one.span is None:
             continue
         beat = replace(one.beat, clock=_clock_of(one))
-        seen = flashes_seen(one.plan, beat, one.lock.camera, one.span, trusted=one.span)
+        known = one.span[0], one.span[1] if one.doubted_from is None else one.doubted_from - 1
+        seen = flashes_seen(one.plan, beat, one.lock.camera, known if one.state == "lost" else one.span, trusted=known)
         flashes += [flash for flash in seen if not flashes or flash.start_s > flashes[-1].start_s + flash.duration_s]
     numbered = tuple(replace(flash, index=number) for number, flash in enumerate(flashes))
     return replace(
