@@ -211,6 +211,37 @@ def test_a_folder_is_read_while_it_is_written(clip: Path, tmp_path: Path) -> Non
         list(read_growing(clip / "truth", take.plan.camera, quiet_s=0.02))
 
 
+def test_frames_that_a_recorder_writes_out_of_order_are_read_in_order_and_none_is_lost(
+    clip: Path, tmp_path: Path
+) -> None:
+    names = sorted(path.name for path in (clip / "frames").iterdir())[:12]
+    (tmp_path / "frames").mkdir()
+
+    def write() -> None:
+        for place in (0, 1, 3, 2, 4, 7, 6, 5, 9, 10, 8, 11):
+            shutil.copyfile(clip / "frames" / names[place], tmp_path / "frames" / f".{names[place]}")
+            (tmp_path / "frames" / f".{names[place]}").rename(tmp_path / "frames" / names[place])
+            time.sleep(0.03)
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    take = ps.open_take(clip)
+    found = [frame.index for frame in read_growing(tmp_path, take.plan.camera, quiet_s=0.6)]
+    writer.join()
+    assert found == list(range(12))
+
+
+def test_a_recorder_that_numbers_by_twos_is_waited_for_once_and_not_at_each_frame(clip: Path, tmp_path: Path) -> None:
+    files = sorted((clip / "frames").iterdir())[:40:2]
+    (tmp_path / "frames").mkdir()
+    for file in files:
+        shutil.copyfile(file, tmp_path / "frames" / file.name)
+    began_s = time.monotonic()
+    found = [frame.index for frame in read_growing(tmp_path, ps.open_take(clip).plan.camera, quiet_s=0.4)]
+    assert found == list(range(0, 40, 2))
+    assert time.monotonic() - began_s < 3.0, "a quarter of a second for each of twenty would be five"
+
+
 @pytest.mark.parametrize(
     ("raw", "said"),
     [

@@ -18,6 +18,8 @@ LOOK_S = 0.004
 """Between two looks into the folder."""
 WHOLE_S = 2.0
 """A file that cannot be decoded for this long is damaged, and not merely still being written."""
+LATE_S = 0.25
+"""A number that is left out is waited for so long after a later one came: recorders write with several threads."""
 QUIET_S = 10.0
 """After this long without a new frame the recorder has ended."""
 
@@ -25,16 +27,20 @@ QUIET_S = 10.0
 def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> Iterator[Frame]:
     """Give the frames that appear in a folder or its ``frames/``, until none has for ``quiet_s``.
 
-    Numbers that are left out count as dropped frames. Raises PsvideoError where the folder is not there, where frames
-    are not the camera's, and where a file stays unreadable.
+    Numbers that are left out count as dropped frames, unless their files come a moment late. Raises PsvideoError where
+    the folder is not there, where frames are not the camera's, and where a file stays unreadable.
     """
     if not folder.is_dir():
         raise PsvideoError(f"{folder}: there is no such folder. Name the one that the recorder writes into.")
     done, first, look = -1, None, ""
+    seen_s: dict[int, float] = {}
     heard_s = time.monotonic()
     while time.monotonic() - heard_s < quiet_s:
-        new = _new_files(folder, done)
+        new, before = _new_files(folder, done), done
+        seen_s |= {number: time.monotonic() for number, _ in new if number not in seen_s}
         for number, file in new:
+            if first is not None and number > done + 1 and time.monotonic() - seen_s[number] < LATE_S:
+                break  # the one before may still come
             picture = _whole(file)
             head = picture.header
             if (head.width_px, head.height_px) != (camera.width_px, camera.height_px) or look not in ("", looks(head)):
@@ -45,8 +51,9 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
                 )
             check_live_filters(file, head, camera.encoding.cfa)
             first, look, done = number if first is None else first, looks(head), number
+            seen_s.pop(number)
             yield Frame(index=number - first, number=number, coded=in_codes(picture, camera.encoding))
-        if new:
+        if done > before:
             heard_s = time.monotonic()
         else:
             time.sleep(LOOK_S)
