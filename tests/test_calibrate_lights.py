@@ -307,6 +307,80 @@ def test_a_calibration_that_failed_is_repeated_without_force(
     assert main(words) == 2
 
 
+CARD = {"key": (0.4, 0.3), "left": (-0.5, 0.1), "top": (0.0, 0.5), "low": (0.1, -0.4)}
+
+
+def card_pictures(folder: Path, *, part: tuple[int, int, int, int], grain: float = 0.002) -> Path:
+    """Photograph a white card of albedo 0.9, in a part of the picture, before a dark wall; its rig lies beside."""
+    folder.mkdir()
+    left, top, right, bottom = part
+    lights = []
+    for n, (name, (x, y)) in enumerate(CARD.items()):
+        direction = np.array([x, y, 1.0]) / np.sqrt(x * x + y * y + 1)
+        picture = np.full((120, 160), 0.03)
+        picture[top:bottom, left:right] = 0.9 * (0.8 - 0.1 * n) * direction[2]
+        picture += np.random.default_rng(n).normal(0, grain, picture.shape)
+        plane = picture.astype(np.float32)
+        write_exr(folder / f"{name}.exr", dict.fromkeys("RGB", plane), half=False)
+        lights.append(Light(name=name, direction=(float(direction[0]), float(direction[1]), float(direction[2]))))
+    folder.with_suffix(".toml").write_text(format_rig(Rig(lights=tuple(lights))))
+    return folder
+
+
+def strengths_by(rig: Path) -> list[float]:
+    """Return the lights' strengths in the order of ``CARD``."""
+    found = {light.name: light.intensity[0] for light in read_rig(rig).lights}
+    return [found[name] for name in CARD if name in found]
+
+
+def test_a_white_card_that_fills_a_part_of_the_picture_is_named_with_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The median of the picture is the wall's, and was taken for the card's: strengths ten times too small."""
+    folder = card_pictures(tmp_path / "card", part=(40, 20, 100, 80))
+    words = [
+        "calibrate",
+        "flat-field",
+        str(folder),
+        "--rig",
+        str(tmp_path / "card.toml"),
+        "-o",
+        str(tmp_path / "r.toml"),
+    ]
+    assert main(words) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"psvideo: {folder}: A part of the picture, about ")
+    box = said.partition("about ")[2].partition(" (")[0]
+    left, top, right, bottom = map(int, box.split(","))
+    assert 40 <= left <= 55
+    assert 20 <= top <= 35
+    assert 85 <= right <= 100
+    assert 65 <= bottom <= 80
+    assert main([*words, "--box", box]) == 0
+    np.testing.assert_allclose(strengths_by(tmp_path / "r.toml"), [0.8, 0.7, 0.6, 0.5], rtol=0.005)
+
+
+def test_grain_is_no_falloff_and_a_light_without_a_picture_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = card_pictures(tmp_path / "card", part=(0, 0, 160, 120), grain=0.05)
+    (folder / "low.exr").unlink()
+    words = [
+        "calibrate",
+        "flat-field",
+        str(folder),
+        "--rig",
+        str(tmp_path / "card.toml"),
+        "-o",
+        str(tmp_path / "r.toml"),
+    ]
+    assert main(words) == 0
+    said = capsys.readouterr().err
+    assert "not evenly lit" not in said
+    assert "1 of the rig's 4 lights has no picture here and is not in the rig that is written: 'low'" in said
+    np.testing.assert_allclose(strengths_by(tmp_path / "r.toml"), [0.8, 0.7, 0.6], rtol=0.01)
+
+
 def test_what_is_no_white_target_gives_no_strengths(
     shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

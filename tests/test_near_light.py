@@ -1,5 +1,6 @@
 """Near lights: every pixel has lights of its own, and their normals are as exact as the surface's place is known."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -430,17 +431,38 @@ def test_a_clip_lit_by_a_real_rig_of_leds_becomes_normals(
     clip, out = tmp_path / "clip", tmp_path / "out"
     assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "-q"]) == 0
     command = ["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(out)]
+    whole = (clip / "rig.toml").read_text()
+    (clip / "rig.toml").write_text(re.sub(r"\[surface\]\n.*\n", "", whole))
     assert main(command) == 1
-    assert "[surface] plane" in capsys.readouterr().err
-    with (clip / "rig.toml").open("a") as file:
-        file.write("\n[surface]\nplane = [0.0, 0.0, 1.0, 0.73]\n")
-    assert main(command) == 0
+    said = capsys.readouterr().err
+    assert said.startswith(f"psvideo: {clip / 'rig.toml'}: Light ")
+    assert "[surface] plane" in said
+    (clip / "rig.toml").write_text(whole)
+    assert main(command) == 0, "what synth writes is what normals reads"
     assert "The lights are near" in (out / "report.json").read_text()
     found, valid = picture(next((out / "normals").iterdir())), picture(next((out / "valid").iterdir())) > 0
     true, inside = picture(clip / "truth" / "normals.exr"), picture(clip / "truth" / "mask.exr") > 0.5
     assert (valid & inside).sum() > 0.7 * inside.sum()
     apart = np.linalg.norm(found - true, axis=-1)[valid & inside]
     assert np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1))).mean() < 0.6
+
+
+def test_a_virtual_crew_measures_how_far_the_subject_is_where_lights_are_near(tmp_path: Path) -> None:
+    """Its ball of 0.3 m at 0.85 m: the nearest point is 0.7 m away, the rim 0.85."""
+    near = '[[light]]\nname = "a"\nposition_m = [0.3, 0.0, 0.0]\n'
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(frames=2, lights=near))
+    ps.shoot(scene, tmp_path / "clip")
+    plane = ps.read_rig(tmp_path / "clip" / "rig.toml").plane
+    assert plane is not None
+    assert plane[:3] == (0.0, 0.0, 1.0)
+    assert 0.72 < plane[3] < 0.78
+    scene.write_text(SCENE.format(frames=2, lights=near.replace("position_m", "direction").replace("0.0]", "1.0]")))
+    ps.shoot(scene, tmp_path / "distant")
+    assert ps.read_rig(tmp_path / "distant" / "rig.toml").plane is None
+    flat = SCENE.replace('view = "perspective"\nfocal_px = 300.0', "width_m = 0.6")
+    scene.write_text(flat.format(frames=2, lights=near))
+    assert "view = 'perspective'" in ps.shoot(scene, tmp_path / "flat").warnings[0]
 
 
 def picture(path: Path) -> NDArray[np.float32]:

@@ -3,8 +3,9 @@
 The message names the file (or the option), says what was found, what was expected and what to do about it.
 """
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 
 class PsvideoError(Exception):
@@ -27,6 +28,21 @@ class AllDoneError(PsvideoError):
     """A run was to be resumed that had ended well, with the same inputs: nothing was left to do."""
 
     exit_status = 0
+
+
+@contextlib.contextmanager
+def said_of(file: object) -> Iterator[None]:
+    """Begin what is raised within by the name of the file that it is about; functions of records know of no file.
+
+    >>> with said_of("rig.toml"):
+    ...     raise PsvideoError("Light 'key' is behind the surface.")
+    Traceback (most recent call last):
+    psvideo.errors.PsvideoError: rig.toml: Light 'key' is behind the surface.
+    """
+    try:
+        yield
+    except PsvideoError as fault:
+        raise type(fault)(f"{file}: {fault}") from None
 
 
 def check_kind(name: str, given: object, kind: type | tuple[type, ...], expected: str) -> None:

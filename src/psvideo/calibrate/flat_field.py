@@ -26,6 +26,11 @@ MOST_ERROR = 0.5
 """Intensities less certain than this share of themselves are none: no flat target differs so much from row to row."""
 MOST_PIXELS = 20_000
 ROUNDS = 5
+BLOCKS = 24
+"""The target is compared with itself in so many blocks a side: what grain does to single pixels is no falloff."""
+PART = 1.6
+"""Where a twentieth of the picture is so many times brighter than half of it under all lights alike, the target fills
+only that part: lamps are brightest in places of their own, and lenses darken corners by less than half of that."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,10 +63,11 @@ def measure_flat_field(
     """Return every light's intensity. ``ground`` is where the target stands, needed where lights are near.
 
     Raises PsvideoError where the rig lacks a light, where one does not reach the target, where too much of it is
-    saturated, or where what is seen is no flat target.
+    saturated, or where what is seen is no flat target, or more than it.
     """
     lights = rig.select(pictures.names)
-    found = [_flat(light, n, pictures, target, ground) for n, light in enumerate(lights)]
+    measured = [_flat(light, n, pictures, target, ground) for n, light in enumerate(lights)]
+    found = [light for light, _ in measured]
     worst = max(found, key=lambda one: one.intensity_error)
     if worst.intensity_error > MOST_ERROR:
         raise PsvideoError(
@@ -69,7 +75,34 @@ def measure_flat_field(
             f"{worst.intensity_error:.0%}, as where the pictures show no white target, or more than it. Expected a "
             "matte white one that faces the camera or lies in the rig's plane: name its part of the picture with `box`."
         )
+    _refuse_part(np.array([blocks for _, blocks in measured]), target)
     return found
+
+
+def _refuse_part(blocks: FloatArray, target: Target) -> None:
+    """Raise PsvideoError where the target fills only a part of the picture, or of the box; ``blocks`` (light, row,
+    col) are what it shows under every light, 1 in the median."""
+    alike = np.exp(np.log(np.maximum(blocks, 1e-3)).mean(axis=0))
+    alike /= np.nanmedian(alike)
+    brightest = float(np.nanpercentile(alike, 95))
+    if not brightest > PART:
+        return
+    rows, cols = np.nonzero(alike > np.sqrt(brightest))
+    top, bottom = _from_blocks(rows, alike.shape[0], target.rows)
+    left, right = _from_blocks(cols, alike.shape[1], target.cols)
+    raise PsvideoError(
+        f"A part of the picture, about {left},{top},{right},{bottom} (left, top, right, bottom), is {brightest:.1f} "
+        "times as bright as most of it under all lights. Expected the white target alone: name its part of the picture "
+        "with `box`, or go nearer."
+    )
+
+
+def _from_blocks(at: NDArray[np.intp], count: int, whole: slice) -> tuple[int, int]:
+    """Return the first and the last pixel, past the end, of blocks ``at`` among so many of a part of the picture,
+    without those at both ends, which the target may fill in part."""
+    blocks = np.array_split(np.arange(whole.start, whole.stop), count)
+    inset = 1 if at.max() - at.min() > 2 else 0
+    return int(blocks[at.min() + inset][0]), int(blocks[at.max() - inset][-1]) + 1
 
 
 def with_intensities(rig: Rig, found: list[FlatLight]) -> Rig:
@@ -114,7 +147,10 @@ def on_target(
     return values / np.broadcast_to(shade, usable.shape)[..., None] / target.albedo, usable
 
 
-def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None) -> FlatLight:
+def _flat(
+    light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None
+) -> tuple[FlatLight, FloatArray]:
+    """Return a light's strength, and what the target shows in blocks, 1 in the median."""
     flat, usable = on_target(light, n, pictures, target, ground)
     level = np.median(flat[usable], axis=0)
     if np.min(level) <= 0:
@@ -128,8 +164,9 @@ def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground:
     mean = float(level.mean())
     grey = np.where(usable, flat.mean(axis=2) / mean, np.nan)
     coefficients, left = _smooth(grey, target, pictures)
-    low, high = np.nanpercentile(grey, [5, 95])
-    return FlatLight(
+    blocks = _in_blocks(grey)
+    low, high = np.nanpercentile(blocks, [5, 95])
+    measured = FlatLight(
         name=light.name,
         intensity=level,
         intensity_error=float(np.std(patches) / np.sqrt(max(len(patches) - 1, 1)) / mean),
@@ -137,6 +174,14 @@ def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground:
         coefficients=coefficients,
         left=left,
     )
+    return measured, blocks
+
+
+def _in_blocks(grey: FloatArray) -> FloatArray:
+    """Return the medians of blocks of a picture (row, col), NaN where nothing is known."""
+    rows, cols = (np.array_split(np.arange(size), min(size, BLOCKS)) for size in grey.shape)
+    parts = [[grey[one[0] : one[-1] + 1, other[0] : other[-1] + 1] for other in cols] for one in rows]
+    return np.array([[np.nanmedian(p) if np.isfinite(p).any() else np.nan for p in line] for line in parts])
 
 
 def falloff_of(found: Sequence[FlatLight], target: Target, pictures: LightPictures) -> Falloff:

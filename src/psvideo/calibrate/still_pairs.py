@@ -162,9 +162,9 @@ def _left_over(known: Sequence[str], places: Sequence[int], whose: str) -> str:
     without = [name for place, name in enumerate(known) if place not in places]
     if not without:
         return ""
-    what = "light is" if len(without) == 1 else "lights are"
+    what = "is" if len(without) == 1 else "are"
     return (
-        f" {len(without)} of the {len(known)} {what} left out, as no picture bears the name: "
+        f" {len(without)} of the {len(known)} lights {what} left out, as no picture bears the name: "
         f"{listed(without, LISTED)} of {whose}."
     )
 

@@ -60,8 +60,8 @@ def _about_the_rig(plan: Plan, path: Path) -> tuple[Caution, ...]:
         return ()
     camera = plan.camera
     near = is_near(lights)
-    ground = ground_of(known, height_px=camera.height_px, width_px=camera.width_px) if near else None
     try:
+        ground = ground_of(known, height_px=camera.height_px, width_px=camera.width_px) if near else None
         lit = illumination(lights, channels=3, ground=ground)
     except PsvideoError as fault:
         return (Caution(kind="rig", level="warning", text=f"{path}: {fault}"),)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from psvideo.errors import NoStrobeError
+from psvideo.errors import NoStrobeError, said_of
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import SCHEMA as RIG
 from psvideo.formats.rig_toml import format_rig, read_rig
@@ -109,7 +109,8 @@ def live(
     if timing_path is not None:
         refuse_existing(timing_path, force=force, mark=TIMING)
     if known is not None:
-        _check_rig(known, played)
+        with said_of(rig):
+            _check_rig(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
     running.prepare = lambda: rehearse(played, known, step=running.chain.step, page=page)
     keep = _keeper(path_if_given("rig_out", rig_out), force=force)

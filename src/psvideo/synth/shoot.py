@@ -143,6 +143,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
     clipped = [_record(stage, folder, n, image) for n, image in zip(kept, light, strict=True)]
     (folder / PLAN_FILE).write_text(format_plan(claimed_plan(scene)), encoding="utf-8")
     (folder / "rig.toml").write_text(format_rig(stage.rig), encoding="utf-8")
+    no_plane = stage.rig.plane is None and any(light.position_m is not None for light in stage.rig.lights)
     write_timing(folder / "truth", plan, flashes, truth.plates)
     write_scene_truth(folder / "truth", scene, plan, clock, max(clipped), traced)
     return VirtualTake(
@@ -152,7 +153,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
         complete=sum(flash.complete for flash in flashes),
         clock=clock,
         clipped_share=max(clipped),
-        warnings=tuple(_warnings(max(clipped), len(flashes))),
+        warnings=tuple(_warnings(max(clipped), len(flashes), no_plane=no_plane)),
     )
 
 
@@ -167,7 +168,13 @@ def _record(stage: Stage, folder: Path, n: int, image: Image) -> float:
     return float(np.mean(sampled >= 1.0))
 
 
-def _warnings(clipped: float, flashes: int) -> Iterator[str]:
+def _warnings(clipped: float, flashes: int, *, no_plane: bool) -> Iterator[str]:
+    if no_plane:
+        yield (
+            "lights are near, and rig.toml does not say where the surface is, so that psvideo normals refuses it: that "
+            "needs a view in perspective and a first object that is seen. Give the camera view = 'perspective' and "
+            "focal_px."
+        )
     if clipped > CLIPPED_WARNING:
         yield (
             f"up to {clipped:.1%} of a frame's samples saturate; lower the lights' intensity or the ambient level in "

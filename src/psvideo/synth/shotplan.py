@@ -65,13 +65,18 @@ def reference_durations_s(plan: Plan) -> dict[str, float]:
     return found
 
 
-def true_rig(scene: Scene) -> Rig:
-    """Return the rig with the lights where they truly are."""
+def true_rig(scene: Scene, subject_m: float | None = None) -> Rig:
+    """Return the rig with the lights where they truly are.
+
+    ``subject_m`` is how far before the camera the subject stands: where lights are near, the crew measured it, too.
+    """
     reference_s = reference_durations_s(true_plan(scene))
     camera = scene.camera
     perspective = camera.view == "perspective" and camera.focal_px is not None
     focal = camera.focal_px or 0.0
+    near = any(light.position_m is not None for light in scene.light)
     return Rig(
+        plane=(0.0, 0.0, 1.0, round(subject_m, 3)) if perspective and near and subject_m is not None else None,
         lights=tuple(_light(light, reference_s.get(light.name)) for light in scene.light),
         focal_px=(focal, focal) if perspective else None,
         principal_px=camera.principal if perspective else None,

@@ -4,7 +4,7 @@ A scene that stands still is looked at once, and every slot of the plan has one 
 for every flash, at the middle of the flash, and for every frame's ambient light, at the middle of the frame.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,4 +68,13 @@ def set_stage(scene: Scene, folder: Path) -> Stage:
     """Load and place everything. ``folder`` is where the scene's relative paths start."""
     bodies = tuple(make_body(table, folder) for table in scene.object)
     still = None if scene.moves else cast_rays(bodies, scene.camera, 0.0)
-    return Stage(scene=scene, plan=true_plan(scene), rig=true_rig(scene), bodies=bodies, still=still)
+    rig = true_rig(scene, _subject_m(scene, bodies))
+    return Stage(scene=scene, plan=true_plan(scene), rig=rig, bodies=bodies, still=still)
+
+
+def _subject_m(scene: Scene, bodies: Sequence[Body]) -> float | None:
+    """Return how far before the lens the scene's first body stands, as a tape shows it; None where nobody needs it."""
+    if all(light.position_m is None for light in scene.light) or not bodies:
+        return None
+    depth_m = -cast_rays(bodies[:1], scene.camera, 0.0).hits.point_m[:, 2]
+    return float(np.median(depth_m)) if len(depth_m) else None

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from psvideo.calibrate.led_colours import LedColours, measure_led_colours, with_colours
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import said_of
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
@@ -53,8 +54,9 @@ def colours(
     check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
-    target, ground = white_target(found, known, albedo=albedo, box=box)
-    measured = measure_led_colours(found, known, target, ground=ground)
+    target, ground = white_target(found, known, Path(rig), albedo=albedo, box=box)
+    with said_of(pictures):
+        measured = measure_led_colours(found, known, target, ground=ground)
     made = with_colours(known, measured)
     write_text(rig_path, format_rig(made))
     return ColourCalibration(found=measured, rig=made)

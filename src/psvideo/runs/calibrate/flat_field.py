@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.calibrate.flat_field import FlatLight, Target, falloff_of, measure_flat_field, with_intensities
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import UsageError
+from psvideo.errors import UsageError, said_of
 from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
 from psvideo.formats.flat_toml import format_falloff
 from psvideo.formats.rig_toml import format_rig, read_rig
@@ -16,7 +16,7 @@ from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.model.irradiance.ground import Ground, ground_of
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
-from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
+from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out, warn_of_unmeasured
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 UNEVEN = 0.1
@@ -66,8 +66,10 @@ def flat_field(
     check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
-    target, ground = white_target(found, known, albedo=albedo, box=box)
-    lights = measure_flat_field(found, known, target, ground=ground)
+    warn_of_unmeasured(known, found.names, caller)
+    target, ground = white_target(found, known, Path(rig), albedo=albedo, box=box)
+    with said_of(pictures):
+        lights = measure_flat_field(found, known, target, ground=ground)
     measured = with_intensities(known, lights)
     write_text(rig_path, format_rig(measured))
     if flat_path is not None:
@@ -87,12 +89,14 @@ def check_albedo(albedo: float) -> None:
 
 
 def white_target(
-    found: LightPictures, known: Rig, *, albedo: float, box: tuple[int, int, int, int] | None
+    found: LightPictures, known: Rig, rig_path: Path, *, albedo: float, box: tuple[int, int, int, int] | None
 ) -> tuple[Target, Ground | None]:
     """Return the white target of some pictures: it faces the camera, or lies in the rig's plane; and where it stands,
-    where lights are near. Raises UsageError where the box is outside the picture."""
+    where lights are near. Raises UsageError where the box is outside the picture, and PsvideoError where the rig (read
+    from ``rig_path``) does not say where the surface is."""
     near = is_near(known.select(found.names))
-    ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
+    with said_of(rig_path):
+        ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
     normal = np.array([0.0, 0.0, 1.0] if known.plane is None else known.plane[:3])
     rows, cols = _part(box, found)
     return Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols), ground

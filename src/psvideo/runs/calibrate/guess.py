@@ -4,6 +4,7 @@ from pathlib import Path
 
 from psvideo.calibrate.guess import ERROR_DEG, Guess, guess_rig
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import said_of
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Prior
@@ -32,7 +33,8 @@ def guess(
     """
     rig_path = rig_out(out, force=force)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
-    made = guess_rig(found, prior=prior)
+    with said_of(pictures):
+        made = guess_rig(found, prior=prior)
     said = (
         f"A GUESS: directions from the pictures alone ({made.prior}, and a subject that bulges to the camera). Expect "
         f"them to be wrong by {ERROR_DEG:g} degrees, and hollow may stand for bulging. Calibrate on a sphere."

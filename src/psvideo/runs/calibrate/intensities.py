@@ -5,10 +5,11 @@ from pathlib import Path
 
 from psvideo.calibrate.cho2020 import measure_strengths
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import said_of
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig, directions
-from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
+from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out, warn_of_unmeasured
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 
@@ -41,8 +42,12 @@ def intensities(
     rig_path = rig_out(out, force=force)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
+    warn_of_unmeasured(known, found.names, caller)
     lights = known.select(found.names)
-    strengths = measure_strengths(found, directions(lights))
+    with said_of(rig):
+        towards = directions(lights)
+    with said_of(pictures):
+        strengths = measure_strengths(found, towards)
     measured = tuple(
         replace(light, intensity=tuple(float(f"{value:.6g}") for value in values))
         for light, values in zip(lights, strengths.intensity.tolist(), strict=True)

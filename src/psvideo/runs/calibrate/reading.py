@@ -1,5 +1,6 @@
 """What calibrations of lights begin with: which outputs may be written, and the pictures, one per light."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets
@@ -7,8 +8,12 @@ from psvideo.clip.transfer import check_transfer
 from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, check_ending, refuse_existing
+from psvideo.model.rig import Rig
+from psvideo.model.units import listed
 from psvideo.runs.photographs.light_sets import Reading, sets_of
 from psvideo.runs.steps.caller import Caller
+
+MOST_NAMED = 6
 
 
 def rig_out(out: Path | str, *, force: bool) -> Path:
@@ -32,6 +37,18 @@ def reading_of(plan: Path | str | None, frames: str | None, first_light: str | N
     check_transfer(transfer)
     given = None if plan is None else Path(plan)
     return Reading(plan=given, frames=frames, first_light=first_light, transfer=transfer)
+
+
+def warn_of_unmeasured(known: Rig, names: Sequence[str], caller: Caller) -> None:
+    """Warn of lights of a rig of which there is no picture: the rig that is written is without them."""
+    lacking = [repr(light.name) for light in known.lights if light.name not in names]
+    if lacking:
+        what = "has no picture here and is" if len(lacking) == 1 else "have no picture here and are"
+        caller.warn(
+            f"{len(lacking)} of the rig's {len(known.lights)} lights {what} not in the rig that is "
+            f"written: {listed(lacking, MOST_NAMED)}. Strengths can only be compared within one set of pictures: take "
+            "the missing ones, too"
+        )
 
 
 def pictures_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightPictures:

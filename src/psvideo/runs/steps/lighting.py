@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psvideo.clip import DepthMaps, Masks, Take, open_depth, open_masks
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import PsvideoError, UsageError, said_of
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.flat_toml import read_falloff
@@ -126,13 +126,14 @@ def read_lighting(
     if iterations is None:
         iterations = NEAR_ITERATIONS if depths is None else 0
     size = {"width_px": clip.width_px, "height_px": clip.height_px}
-    near = near_surface_of(rig, lights, **size, iterations=iterations, depths=depths)
+    with said_of(rig_path):
+        near = near_surface_of(rig, lights, **size, iterations=iterations, depths=depths)
+        lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
     if near is None and near_iterations:
         raise UsageError(
             f"`near_iterations` {near_iterations}: nothing would use it. All lights of {rig_path} are distant, so that "
             "normals do not depend on where the surface is; leave it out."
         )
-    lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
     masks = None if mask_path is None else open_masks(mask_path, **size)
     falloff = None if flat_path is None else _read_falloff(flat_path, take, lights)
     return Lighting(
