@@ -245,6 +245,22 @@ def test_flashes_that_stray_are_followed_where_few_rows_open_and_close_during_th
     assert np.median(error_s) < 0.1 * row_s
 
 
+@pytest.mark.parametrize(("full_well_e", "followed"), [(1500, True), (700, False)])
+def test_flashes_that_stray_are_followed_or_in_the_error_where_rows_show_each_by_one_edge(
+    full_well_e: float, followed: bool, make_plan: PlanMaker
+) -> None:
+    """No row opens in a flash that other rows close in: even and odd rows tell, since noise parts them."""
+    plan = make_plan(height_px=128, width_px=COLUMNS, shutter=0.5, readout=0.41, duration_s=5e-4)
+    row_s = plan.camera.row_time_s
+    shot = shoot(plan, frames=80, jitter_s=0.08 * row_s, noise=Noise(full_well_e=full_well_e, read_e=8))
+    timing = timing_of(plan, shot)
+    lit = [flash for flash in timing.flashes if flash.complete and flash.lights]
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    off_s = np.array([np.abs(true_s - flash.start_s).min() for flash in lit])
+    assert not followed or np.median(off_s) < 0.03 * row_s
+    assert np.sqrt(np.mean(off_s**2)) < 2 * timing.phase_error_rows * row_s
+
+
 def test_frames_missing_without_a_hole_are_found_numbered_and_bridged(plan: Plan) -> None:
     shot = shoot(plan, dropped=(20, 21, 50))
     timing = timing_of(plan, shot, numbers=range(101, 101 + len(shot.frames)))

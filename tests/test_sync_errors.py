@@ -56,3 +56,21 @@ def test_errors_made_are_those_that_are_claimed(kind: str, make_plan: PlanMaker)
 def test_an_unknown_that_rows_do_not_determine_is_not_known_at_all() -> None:
     assert standard_error_of(4e-12) == 2e-6
     assert standard_error_of(-1e-20) == np.inf
+
+
+def test_what_black_cuts_off_noise_adds_to_rows_that_saw_little_is_in_the_error(make_plan: PlanMaker) -> None:
+    """Where a file's black cuts off noise, dark rows are too bright: opening and closing edges err, each in its way."""
+    plan = make_plan(height_px=96, width_px=64, shutter=0.5, readout=0.65, duration_s=6e-4, lights=tuple("abcdef"))
+    ratios = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        plates = {slot: (0.1 + 0.4 * rng.random((96, 64))).astype(np.float32) for slot in plan.lit_slots}
+        clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
+        noise = Noise(full_well_e=20_000, read_e=30)
+        shot = expose(plates, plan, frames=30, clock=clock, noise=noise, bits=12, seed=seed)
+        timing = timing_from_rows(plan, np.arange(30), np.maximum(shot.frames, 0).mean(axis=2, dtype=np.float64))
+        true_s = np.array([flash.start_s for flash in shot.flashes])
+        off_s = timing.start_s - true_s[np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)]
+        ratios.append(np.sqrt(np.mean(off_s**2)) / (timing.phase_error_rows * timing.row_time_s))
+    assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 1.7
+    assert np.max(ratios) < 2.3

@@ -292,7 +292,7 @@ def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[fl
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
     basis = np.zeros((len(rows.window_start) + 1 + len(GLOBALS), 1))  # what a fit may free is held here
     basis[: len(rows.window_start) + 1] = 1.0
-    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=False)
+    _, hessian, scores, _ = projected(plan, rows, beat, weight, basis, tails=False)
     shortest_s = plan.shortest_flash_s
     known = np.full((1, 1), shortest_s**-2.0)
     shift_s = float(scores.sum() / (hessian[0, 0] + known[0, 0]))

@@ -16,7 +16,7 @@ from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_fra
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.freed import freed
-from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, shift_error_s
+from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import across, restless
 from psvideo.sync.rowfit.unknowns.softness import misfit
@@ -149,7 +149,8 @@ def _error_s(plan: Plan, best: _Best, as_seen: Fit, stray: Jitter) -> float:
         known_s = min(known_s, stray.mean_error_s)
     else:
         apart_rows_s = disagreement_s(plan, rows, fit) if rows.restless is None else 0.0
-        known_s = float(np.hypot(known_s * misfit(plan, rows, fit), apart_rows_s))
+        known_s = max(float(np.hypot(known_s * misfit(plan, rows, fit), apart_rows_s)), fit.alike_s)
+        known_s = float(np.hypot(known_s, maybe_astray_s(plan, rows, fit)))
     return float(np.sqrt(known_s**2 + stray.error_s**2 + best.apart_s**2))
 
 

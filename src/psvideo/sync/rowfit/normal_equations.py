@@ -1,5 +1,7 @@
 """The fit's normal equations in the unknowns of a basis, and their solution."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from psvideo.model.camera import FloatArray
@@ -11,6 +13,16 @@ DAMPING = 1e-10
 """This share of every unknown's own precision is added: rows may show two unknowns together, and neither alone."""
 
 
+class Projected(NamedTuple):
+    """Residuals ``rest`` (frame, row), the normal matrix ``hessian`` and scores in the unknowns of a basis, apart by
+    ``scores`` (frame, unknown) and ``at_place`` (place, unknown)."""
+
+    rest: FloatArray
+    hessian: FloatArray
+    scores: FloatArray
+    at_place: FloatArray
+
+
 def projected(
     plan: Plan,
     rows: Profiles,
@@ -20,20 +32,22 @@ def projected(
     *,
     tails: bool,
     steepness: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals, the normal matrix and every frame's scores (frame, unknown) in the unknowns of a basis."""
-    rest, windows, score = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
+) -> Projected:
+    """Return the normal equations in the unknowns of a basis; ``at_place`` is empty without ``steepness``."""
+    found = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
     knots = len(rows.window_start) + 1
     size = basis.shape[1]
-    hessian = np.zeros((size, size))
+    hessian, at_place = np.zeros((size, size)), np.zeros((found.place.shape[1], size))
     common = basis[knots:]
-    for w, matrix in enumerate(windows):
+    for w, matrix in enumerate(found.windows):
         local = np.vstack([basis[w], basis[w + 1], common])
         moved = np.flatnonzero(local.any(axis=0))
         hessian[np.ix_(moved, moved)] += local[:, moved].T @ matrix @ local[:, moved]
+        at_place[:, moved] += found.place[w] @ local[:, moved]
     window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
+    score = found.frame
     scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
-    return rest, hessian, scores
+    return Projected(found.rest, hessian, scores, at_place)
 
 
 def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:

@@ -1,6 +1,7 @@
 """Row profiles laid out for fitting, and the compiled row model run over them on all processors."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,6 +175,16 @@ def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | Non
     return rest
 
 
+class Equations(NamedTuple):
+    """Residuals ``rest`` (frame, row), normal matrices ``windows`` (window, signal, signal), and scores, apart by
+    ``frame`` (frame, signal) and by ``place`` in a flash (window, place, signal)."""
+
+    rest: FloatArray
+    windows: FloatArray
+    frame: FloatArray
+    place: FloatArray
+
+
 def equations(
     plan: Plan,
     rows: Profiles,
@@ -182,26 +193,33 @@ def equations(
     *,
     tails: bool,
     steepness: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal).
+) -> Equations:
+    """Return the normal equations of the times.
 
     With ``steepness`` (frame, row), how fast residuals' pulls grow with them, they are errors and not steps: it
-    stands in the matrices for the weight, and residuals count in the scores as if no brightness were fitted to them.
+    stands in the matrices for the weight, residuals count in the scores as if no brightness were fitted to them, and
+    scores are kept apart by place too.
     """
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     honest, growth = steepness is not None, weight if steepness is None else steepness
     rest = np.empty_like(rows.value)
+    place = np.zeros(rest.shape if honest else (0, 0), np.int64)
+    if honest:
+        row_model.places(seen, flashes, place)
 
-    def run(first: int, last: int) -> tuple[FloatArray, FloatArray]:
+    def run(first: int, last: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         hessian = np.zeros((len(rows.window_start), row_model.SIGNALS, row_model.SIGNALS))
         score = np.zeros((len(rows.value), row_model.SIGNALS))
-        projection.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
-        return hessian, score
+        apart = np.zeros((len(rows.window_start), row_model.PLACES if honest else 0, row_model.SIGNALS))
+        projection.equations(
+            seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score, place, apart
+        )
+        return hessian, score, apart
 
     parts = over_ranges(run, rows.value.shape[1], each=rows_of_a_part(len(rows.value)))
-    lower = np.sum([hessian for hessian, _ in parts], axis=0)
+    lower, score, apart = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
     full = lower + np.swapaxes(np.tril(lower, -1), 1, 2)
-    return rest, full, np.sum([score for _, score in parts], axis=0)
+    return Equations(rest, full, score, apart)
 
 
 def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:

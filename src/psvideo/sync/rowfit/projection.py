@@ -91,11 +91,17 @@ def equations(
     rest: FloatArray,
     hessian: FloatArray,
     score: FloatArray,
+    place: NDArray[np.int64],
+    at_place: FloatArray,
 ) -> None:
-    """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
-    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. The normal matrices hold ``steepness`` (frame,
-    row): how fast a residual's pull grows with it, which is its weight but in robust fits. Where ``honest``, residuals
-    count in the scores as large as if no brightness had been fitted to them (MacKinnon and White 1985, HC2)."""
+    """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), and their ``weight *
+    signal * rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. Unless ``at_place`` (window, place,
+    SIGNALS) is empty, they are added to it too; it keeps windows and each sample's ``place`` (frame, row) apart.
+
+    The normal matrices hold ``steepness`` (frame, row): how fast a residual's pull grows with it, which is its weight
+    but in robust fits. Where ``honest``, residuals count in the scores as large as if no brightness had been fitted to
+    them (MacKinnon and White 1985, HC2).
+    """
     frames = len(rows.value)
     size = width(rows, flashes)
     design = np.empty((frames, size))
@@ -135,6 +141,8 @@ def equations(
                 for p in range(used):
                     pull = weight[n, row] * signals[n, p]
                     score[n, p] += pull * error
+                    if at_place.shape[1] > 0:
+                        at_place[window, place[n, row], p] += pull * error
                     for q in range(p + 1):
                         hessian[window, p, q] += steepness[n, row] * signals[n, p] * signals[n, q]
 

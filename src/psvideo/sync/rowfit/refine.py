@@ -30,7 +30,8 @@ LEAST_BLUR_ROWS = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """A beat and how well it fits. ``errors_s`` holds the standard error of every time that was free, by name."""
+    """A beat and how well it fits. ``errors_s`` holds the standard error of every time that was free, by name;
+    ``alike_s`` is as in ``Believable``."""
 
     beat: Beat
     rest: FloatArray
@@ -38,6 +39,7 @@ class Fit:
     shift_error_s: float
     errors_s: dict[str, float]
     explained: float
+    alike_s: float = 0.0
 
     @property
     def loss(self) -> float:
@@ -66,7 +68,7 @@ def refine(
     """Fit shift and clock ratio, and the times named in ``free``, by steps that are taken only as far as they help."""
     beat, rest, weight, trust = _stepped(plan, rows, beat, free=free, steps=steps, first_scale=first_scale)
     basis, unit_s = _straight(rows, free), _units(plan, rows, free)
-    covariance = believable(plan, rows, beat, weight, trust, basis, prior(unit_s, free))
+    covariance, alike_s = believable(plan, rows, beat, weight, trust, basis, prior(unit_s, free))
     return Fit(
         beat=beat,
         rest=rest,
@@ -74,6 +76,7 @@ def refine(
         shift_error_s=mean_error(basis[: len(rows.window_start) + 1], covariance),
         errors_s={name: standard_error_of(covariance[2 + n, 2 + n]) for n, name in enumerate(free)},
         explained=explained(rows, rest),
+        alike_s=alike_s,
     )
 
 
@@ -100,7 +103,7 @@ def _stepped(
         scale = errors_of_residuals(rows, rest, first_scale * 0.4**step)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
-        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
+        rest, hessian, scores, _ = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
         move = solved(hessian + prior(unit_s, free), scores.sum(axis=0))
         beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
@@ -133,7 +136,7 @@ def _gains(
     every = (*free, *names)
     scale = errors_of_residuals(rows, fit.rest, share)
     weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
-    _, hessian, scores = projected(plan, rows, fit.beat, weight, _straight(rows, every), tails=True)
+    _, hessian, scores, _ = projected(plan, rows, fit.beat, weight, _straight(rows, every), tails=True)
     gains: dict[str, float] = {}
     for name in names:
         kept = [*range(2 + len(free)), 2 + every.index(name)]

@@ -25,6 +25,10 @@ SIGNALS = 7
 SPREAD = 3.0**0.5
 """Three points, at these standard deviations with weights 1, 4 and 1, blur as a Gaussian (Gauss-Hermite quadrature)."""
 
+PARTS = 8
+PLACES = 2 * PARTS + 1
+"""Parts of a flash in which a row may open, then those in which it may close; 0: it does neither."""
+
 
 class Rows(NamedTuple):
     """Profiles as compiled code takes them. ``row_place`` counts rows from the first that opens."""
@@ -125,6 +129,32 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
         design[flashes.unknowns + 2 * b] = np.cos(turn)
         design[flashes.unknowns + 2 * b + 1] = np.sin(turn)
     return k
+
+
+@EXACT.kept
+def places(rows: Rows, flashes: Flashes, found: IntArray) -> None:
+    """Fill ``found`` (frame, row) with the part of a flash in which each row opens or closes, below ``PLACES``.
+
+    A flash lasts here until its tail has fallen to 1/e; where a row opens in one and closes in another, it opens.
+    """
+    frames, height = found.shape
+    for row in range(height):
+        k = 0
+        for n in range(frames):
+            open_s = rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s
+            close_s = open_s + rows.exposure_s
+            found[n, row] = 0
+            while k < len(flashes.start_s) and flashes.start_s[k] + flashes.duration_s[k] + flashes.fall_s <= open_s:
+                k += 1
+            j = k
+            while found[n, row] == 0 and j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+                lasts_s = flashes.duration_s[j] + flashes.fall_s
+                opens, closes = (open_s - flashes.start_s[j]) / lasts_s, (close_s - flashes.start_s[j]) / lasts_s
+                if flashes.unknown[j] > 0 and 0.0 <= opens < 1.0:
+                    found[n, row] = 1 + int(PARTS * opens)
+                elif flashes.unknown[j] > 0 and 0.0 <= closes < 1.0:
+                    found[n, row] = 1 + PARTS + int(PARTS * closes)
+                j += 1
 
 
 @EXACT.called

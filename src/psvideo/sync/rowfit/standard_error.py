@@ -1,5 +1,7 @@
 """How certain the times of a robust fit are: sandwich estimates, which hold where neighbouring frames err together."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from psvideo.model.camera import FloatArray
@@ -14,19 +16,50 @@ LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 CLUSTER, LEAST_CLUSTERS = 12, 8
 """Or whole stretches of frames err together; that needs this many of them to be seen."""
+LEAST_LEFT = 4
+"""So many more places of a flash than there are unknowns must be seen, to tell what residuals at each share."""
+CLEARLY_MORE = 1.6
+"""And the error must be as many times larger then: noise alone makes two estimates of it differ by half."""
+
+
+class Believable(NamedTuple):
+    """The ``covariance`` of the unknowns, and ``alike_s``, the standard error of the flashes' times where residuals err
+    alike at the same places of flashes by clearly more than they do in frames near one another, else 0."""
+
+    covariance: FloatArray
+    alike_s: float
 
 
 def believable(
     plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, trust: FloatArray, basis: FloatArray, known: FloatArray
-) -> FloatArray:
-    """Return the covariance of the unknowns at the end of a robust fit.
+) -> Believable:
+    """Return how certain the unknowns are at the end of a robust fit.
 
     ``weight`` is each sample's, ``trust`` (0 to 1) the part of it that is owed to its residual: a residual whose trust
     falls as it grows pulls less than its weight says (Huber 1981, section 7.6).
     """
     steepness = weight * np.maximum(2.0 * trust - 1.0, LEAST_STEEP)
-    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
-    return sandwich(hessian, scores, known)
+    found = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
+    covariance = sandwich(found.hessian, found.scores, known)
+    knots, common = np.split(basis, [len(rows.window_start) + 1])
+    unknowns = 2 + int(common.any(axis=0).sum())
+    opening, closing = np.split(found.at_place[1:], 2)
+    kinds = (found.at_place[1:], opening + closing)
+    alike_s = max(mean_error(knots, _alike(found.hessian, one, known, unknowns=unknowns)) for one in kinds)
+    return Believable(covariance, alike_s if alike_s > CLEARLY_MORE * mean_error(knots, covariance) else 0.0)
+
+
+def _alike(hessian: FloatArray, at_place: FloatArray, known: FloatArray, *, unknowns: int) -> FloatArray:
+    """Return the covariance of the unknowns if residuals err alike wherever rows open or close at the same place of a
+    flash, as where edges are compressed; 0 where rows do so at few places. Of ``unknowns``, a clock's bends count as
+    none: places are spread over the whole clip."""
+    seen = at_place[at_place.any(axis=1)]
+    left = len(seen) - unknowns
+    if left < LEAST_LEFT:
+        return np.zeros_like(known)
+    bread = solved(hessian + known, np.eye(len(known)))
+    covariance: FloatArray = bread @ (seen.T @ seen) @ bread * len(seen) / left
+    return covariance
 
 
 def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:

@@ -60,7 +60,7 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         scale = errors_of_residuals(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
-        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
+        rest, hessian, scores, _ = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
         inflation = _inflation(hessian, scores, rows)
         strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
         if gain < CLEARLY and not fit.beat.clock.knot_s:
@@ -71,7 +71,8 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         beat = _moved(rows, beat, knots, free, move)
     rest = unexplained(plan, rows, beat, weight)
     bread = np.linalg.inv(hessian + known)
-    covariance = believable(plan, rows, beat, weight, trust, basis, known) + bread @ known @ bread
+    covariance, alike_s = believable(plan, rows, beat, weight, trust, basis, known)
+    covariance = covariance + bread @ known @ bread
     size = len(knots.at_s)
     return replace(
         fit,
@@ -81,6 +82,7 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         shift_error_s=mean_error(basis[:size], covariance),
         errors_s={name: standard_error_of(covariance[size + n, size + n]) for n, name in enumerate(free)},
         explained=explained(rows, rest),
+        alike_s=alike_s,
     )
 
 

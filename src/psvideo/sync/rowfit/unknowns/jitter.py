@@ -17,7 +17,7 @@ from psvideo.sync.rowfit import projection
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
 from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, errors_of_residuals
-from psvideo.sync.rowfit.row_model import Flashes
+from psvideo.sync.rowfit.row_model import Flashes, places
 
 LEAST_FLASHES = 8
 SURE = 5.0
@@ -35,8 +35,11 @@ OUTLIER = 6.0
 STILL = 0.9
 """Where the first rows to see a flash are not those that see it last, even and odd rows are held against one another,
 if the subject stands still: a fit takes away this share of the robust loss. Else brightness would pass for jitter."""
-ROWS_OVER = 20.0
-"""What such rows agree on must be that many times what parts them, as variances: compression makes neighbours alike."""
+ROWS_OVER, ALONE_OVER, ALIKE_ROWS = 20.0, 1.0, 0.1
+"""What such rows agree on must be so many times what parts them, as variances: compression makes neighbours alike.
+Where neighbouring rows that no edge touches err alike by no more than the third (a correlation), the second does."""
+LEAST_ROWS = 400
+"""Fewer pairs of neighbouring rows do not show whether they err alike."""
 CHANCE = 2.0
 """Standard errors by which openings and closings may disagree by chance."""
 ROW_BLOCKS = 8
@@ -109,12 +112,36 @@ def _straying(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[float, float]
             return found
     if gain_of(rows, fit.rest) < STILL:
         return None
+    over = ROWS_OVER if _likeness_of_rows(rows, fit, flashes) > ALIKE_ROWS else ALONE_OVER
+    return _agreed(*_halves(rows, fit, flashes), over=over)
+
+
+def maybe_astray_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return by how much flashes that are not followed may stray one by one, as far as rows that err apart show it."""
+    flashes = compiled_flashes(plan, rows, fit.beat)
+    if gain_of(rows, fit.rest) < STILL or _likeness_of_rows(rows, fit, flashes) > ALIKE_ROWS:
+        return 0.0
+    straying = _agreed(*_halves(rows, fit, flashes), over=0.0, sure=LIKELY)
+    return 0.0 if straying is None else straying[0]
+
+
+def _halves(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[FloatArray, FloatArray]:
+    """Return how strongly even and odd rows shift each flash, shape (flash, 2) twice, as ``pulls`` does."""
     halves = [pulls(rows.only_rows(half), fit, flashes, half) for half in (slice(0, None, 2), slice(1, None, 2))]
-    return _agreed(
-        np.stack([pull.sum(axis=1) for pull, _ in halves], axis=1),
-        np.stack([stiff.sum(axis=1) for _, stiff in halves], axis=1),
-        over=ROWS_OVER,
-    )
+    pull, stiff = (np.stack([half[n].sum(axis=1) for half in halves], axis=1) for n in (0, 1))
+    return pull, stiff
+
+
+def _likeness_of_rows(rows: Profiles, fit: Fit, flashes: Flashes) -> float:
+    """Return the correlation of what neighbouring rows leave unexplained where neither opens or closes in a flash."""
+    place = np.empty(fit.rest.shape, np.int64)
+    places(compiled_rows(rows, fit.beat), flashes, place)
+    rest = fit.rest / errors_of_residuals(rows, fit.rest, 0.0)
+    both = ((place[:, 1:] == 0) & (place[:, :-1] == 0)).ravel()
+    if both.sum() < LEAST_ROWS:
+        return 1.0
+    one, next_one = (np.clip(part.ravel()[both], -OUTLIER, OUTLIER) for part in (rest[:, :-1], rest[:, 1:]))
+    return float((one * next_one).mean() / max(float((one**2).mean() * (next_one**2).mean()) ** 0.5, 1e-30))
 
 
 def _timed(stiff: FloatArray) -> NDArray[np.bool_]:
@@ -188,9 +215,9 @@ def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     for first, last in pairwise(edges.tolist()):
         block = rows.only_rows(slice(first, last))
         weight = np.ascontiguousarray(fit.weight[:, first:last])
-        _, hessian, score = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
-        each.append(score[:, :2].sum())
-        stiff.append(hessian[:, :2, :2].sum())
+        found = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
+        each.append(found.frame[:, :2].sum())
+        stiff.append(found.windows[:, :2, :2].sum())
     pull, whole = np.array(each), float(np.sum(stiff))
     if whole <= 0.0:
         return 0.0
