@@ -492,6 +492,27 @@ def test_a_movie_that_plays_at_another_rate_is_read_with_a_note(tmp_path: Path, 
     assert "plays at 119.88 frames per second and the plan says 120" in misnamed.warnings[0]
 
 
+@pytest.mark.parametrize("rate", [60.0, 59.0])
+def test_timestamps_that_jitter_say_no_other_rate_than_the_plans(
+    rate: float, tmp_path: Path, plan_for: Callable[..., Path]
+) -> None:
+    """A phone's stamps are off by 3 % of a frame or so, the first and the last too: that is no other rate."""
+    plan = plan_for(rows=32, cols=48, fps=Fraction(60))
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        with av.open(str(tmp_path / "x.mp4"), "w") as container:
+            stream: Any = container.add_stream("libx264", rate=60, options={"threads": "1", "bf": "0"})
+            stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
+            stream.codec_context.time_base = Fraction(1, 90_000)
+            for place, frame in enumerate(frame for _ in range(5) for frame in grey_ramp(10)):
+                late = 0.05 * rng.standard_normal()
+                frame.pts, frame.time_base = round(90_000 / rate * (place + 1 + late)), Fraction(1, 90_000)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+        said = [text for text in open_clip(tmp_path / "x.mp4", plan=plan).warnings if "frames per second" in text]
+        assert bool(said) == (rate != 60.0)
+
+
 def test_the_rate_at_which_a_phone_shot_slow_motion_counts(shared_data: Path, plan_for: Callable[..., Path]) -> None:
     movie = shared_data / "movies" / "video_phone" / "androidx_sample_sef_slow_motion.mp4"
     if not movie.is_file():

@@ -175,7 +175,7 @@ def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | Non
     return rest
 
 
-class Equations(NamedTuple):
+class TimeEquations(NamedTuple):
     """Residuals ``rest`` (frame, row), normal matrices ``windows`` (window, signal, signal), and scores, apart by
     ``frame`` (frame, signal) and by ``place`` in a flash (window, place, signal)."""
 
@@ -193,7 +193,7 @@ def equations(
     *,
     tails: bool,
     steepness: FloatArray | None = None,
-) -> Equations:
+) -> TimeEquations:
     """Return the normal equations of the times.
 
     With ``steepness`` (frame, row), how fast residuals' pulls grow with them, they are errors and not steps: it
@@ -219,7 +219,7 @@ def equations(
     parts = over_ranges(run, rows.value.shape[1], each=rows_of_a_part(len(rows.value)))
     lower, score, apart = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
     full = lower + np.swapaxes(np.tril(lower, -1), 1, 2)
-    return Equations(rest, full, score, apart)
+    return TimeEquations(rest, full, score, apart)
 
 
 def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:

@@ -32,9 +32,9 @@ class Movie:
 
     ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. Where the rate
     varies there are ``per_frame`` places from one frame to the usual next one, and ``rates_hz`` are the lowest and the
-    highest rate. ``rate_hz`` is the rate at which the file usually plays, None where a single frame shows none; rounded
-    timestamps leave it unsure by the share ``rate_error``. ``capture_rate_hz`` is the rate at which it was shot, where
-    the file says so.
+    highest rate. ``rate_hz`` is the rate at which the file usually plays, None where a single frame shows none;
+    timestamps that are rounded, or jitter, leave it unsure by the share ``rate_error``. ``capture_rate_hz`` is the rate
+    at which it was shot, where the file says so.
     """
 
     header: Header
@@ -77,7 +77,7 @@ def index_movie(path: Path) -> Movie:
         timestamps=timestamps,
         places=found.places,
         rate_hz=1 / (found.period * found.per_frame * said.time_base_s) if found.period else None,
-        rate_error=1 / (timestamps[-1] - timestamps[0]) if found.period else 0.0,
+        rate_error=found.rate_error,
         capture_rate_hz=said.capture_rate_hz,
         per_frame=found.per_frame,
         rates_hz=_rates_hz(found, said.time_base_s) if found.per_frame > 1 else None,

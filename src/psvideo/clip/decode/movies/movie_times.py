@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import av
 import numpy as np
@@ -16,6 +17,7 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import FloatArray
 
 UNEVEN = 0.25
 LEAST_EVEN_SHARE = 0.5
@@ -25,6 +27,8 @@ MOST_STEPS = 8
 of 1/8 of one another or less."""
 EXACT = 0.02
 """A step is a whole multiple within this share of the usual one, or the timestamps' own unit."""
+UNSURE = 3.0
+"""Standard errors by which timestamps that jitter leave a rate unsure."""
 LEAST_HELD_SHARE = 0.8
 """A rate is held for a while: this many of the steps that are no whole frames are as long as the one before or after.
 Timestamps that jitter, or stumble once, are not."""
@@ -36,7 +40,8 @@ class Places:
 
     ``first`` is how many frames come before the run, ``left_out`` how many are not of it; places count from ``first``.
     The period is 0 where a single frame shows none. Where the rate varies it is the ``per_frame``-th part of the usual
-    step between frames, and places count such parts. ``strays`` is by how many frames timestamps are off, at most.
+    step between frames, and places count such parts. ``strays`` is by how many frames timestamps are off, at most, and
+    ``rate_error`` the share by which they leave the rate unsure.
     """
 
     timestamps: tuple[int, ...]
@@ -46,6 +51,7 @@ class Places:
     left_out: int = 0
     per_frame: int = 1
     strays: float = 0.0
+    rate_error: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,31 +114,45 @@ def frame_places(path: Path, timestamps: Sequence[int]) -> Places:
     if varying := _of_several_rates(timestamps, steps, usual):
         return varying
     first, last = _longest_run(uneven)
-    strays = _stray(timestamps[first : last + 1], counts[first:last])
     if last - first < LEAST_EVEN_SHARE * steps.size or last == first:
         raise PsvideoError(
             f"{path}: its frames do not come at an even rate ({int(uneven.sum())} of {steps.size} steps between "
             "timestamps are no whole number of frames), so their times are not known. Record at a constant frame rate."
         )
-    period = float(steps[first:last].sum() / counts[first:last].sum())
-    places = first + np.concatenate([[0], np.cumsum(counts[first:last])])
+    places = np.concatenate([[0], np.cumsum(counts[first:last])])
+    even = _even_rate(np.array(timestamps[first : last + 1], np.float64), places)
     return Places(
         timestamps=tuple(timestamps[first : last + 1]),
-        places=tuple(int(place) for place in places),
-        period=period,
+        places=tuple(int(place) for place in first + places),
+        period=even.period,
         first=first,
         left_out=len(timestamps) - (last + 1 - first),
-        strays=strays,
+        strays=even.strays,
+        rate_error=even.rate_error,
     )
 
 
-def _stray(timestamps: Sequence[int], counts: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
-    """Return by how many frames timestamps are off, at most, from those of an even rate."""
-    if len(counts) < 2:
-        return 0.0
-    places = np.concatenate([[0], np.cumsum(counts)])
-    rate, first = np.polyfit(places, np.array(timestamps, np.float64), 1)
-    return float(np.abs(first + rate * places - timestamps).max() / rate)
+class _EvenRate(NamedTuple):
+    """The ``period`` in the timestamps' unit, and the rest as in ``Places``."""
+
+    period: float
+    strays: float
+    rate_error: float
+
+
+def _even_rate(timestamps: FloatArray, places: FloatArray) -> _EvenRate:
+    """Return the even rate that timestamps keep: by the first and the last where they are only rounded, else by all."""
+    span = float(timestamps[-1] - timestamps[0])
+    period = span / float(places[-1])
+    if len(places) < 3:
+        return _EvenRate(period, 0.0, 1 / span)
+    fitted, begin = np.polyfit(places, timestamps, 1)
+    off = timestamps - begin - fitted * places
+    most = float(np.abs(off).max())
+    if most <= 1.0:
+        return _EvenRate(period, most / period, 1 / span)
+    error = np.sqrt((off**2).sum() / (len(off) - 2) / ((places - places.mean()) ** 2).sum())
+    return _EvenRate(float(fitted), most / float(fitted), max(1 / span, UNSURE * float(error) / float(fitted)))
 
 
 def _of_several_rates(
@@ -159,6 +179,7 @@ def _of_several_rates(
                 places=tuple(int(place) for place in places),
                 period=period,
                 per_frame=parts,
+                rate_error=1 / float(timestamps[-1] - timestamps[0]),
             )
     return None
 
