@@ -295,3 +295,26 @@ def test_a_lens_that_is_covered_for_a_while_is_looked_through_again_with_one_loc
     timing = timing_of(chain.followed, clip="clip")
     assert sum(one.start_s > (100 + covered) * plan.camera.frame_period_s for one in timing.flashes) > 50
     assert np.abs(apart_rows(timing, np.array([flash.start_s for flash in shot.flashes]), plan)).max() < LIVE_ROWS
+
+
+def test_a_strobe_that_starts_again_while_it_is_searched_for_is_followed_until_then_and_found_again(
+    make_plan: PlanMaker,
+) -> None:
+    plan = make_plan(width_px=8, height_px=96)
+    before, after = shoot(plan, frames=90), shoot(plan, frames=110, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))
+    waiting: list[Callable[[], None]] = []
+    chain = Chain(plan=plan, search=waiting.append)
+    searches = 0
+    for index, image in enumerate([*before.frames, *after.frames]):
+        chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
+        if waiting and index > 90 + 40:  # the first search ends when the strobe has long started again
+            searches += 1
+            waiting.pop()()
+    assert chain.state == "locked"
+    assert (len(chain.followed), searches) == (2, 2)
+    timing = timing_of(chain.followed, clip="clip")
+    true_s = np.array([flash.start_s for flash in before.flashes])
+    true_s = np.concatenate([true_s, [flash.start_s + 90 * plan.camera.frame_period_s for flash in after.flashes]])
+    whole = replace(timing, flashes=tuple(one for one in timing.flashes if one.complete))
+    assert len(whole.flashes) > 120
+    assert np.abs(apart_rows(whole, true_s, plan)).max() < LIVE_ROWS

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import NoStrobeError
-from psvideo.live.following.follow import LATEST, Follower, State, caught_up
+from psvideo.live.following.follow import Follower, State, caught_up
 from psvideo.live.following.history import timing_now
 from psvideo.live.following.lock import LONGEST_S, Lock, frames_to_lock, lock
 from psvideo.live.incoming.ring import Ring, RingFrame, ring_of
@@ -217,9 +217,13 @@ class Chain:
             first = follower.holes[-1].before + extra if later > 0 else follower.doubted_from or 0
             self._ring.moved({at: at + later if at >= first else at for at in self._ring.frames})
         if follower.state == "lost" and before != "lost":
-            odd = index - LATEST if follower.doubted_from is None else follower.doubted_from - follower.extra - 1
-            self._wanted = odd + frames_to_lock(self.plan)
+            self._look_behind(follower)
         return place
+
+    def _look_behind(self, follower: Follower) -> None:
+        """Look for the strobe in frames that came since it was lost."""
+        assert follower.doubted_from is not None  # noqa: S101
+        self._wanted = follower.doubted_from - follower.extra - 1 + frames_to_lock(self.plan)
 
     def _look(self) -> None:
         """Search for the strobe in the latest frames, once there are enough that came since it was last looked for."""
@@ -259,11 +263,10 @@ class Chain:
             follower = caught_up(
                 self.plan, found, [one[1] for one in known], [one[2] for one in known], numbers=numbers
             )
-            for number, mean, doubt in later:
-                follower.add(number, mean, doubt)
             if follower.state != "locked":
                 self._look_later("The strobe was found, and gone again before it could be followed.")
                 return
+            self._catch_up(follower, later)
             self.why = ""
             for before in self.followed:  # what it took for missing in the frames that were searched is known better
                 self.lost_frames -= before.missing_before(self._last or 0) - before.missing_before(numbers[0])
@@ -276,6 +279,12 @@ class Chain:
                 self._ring.moved({number: number + follower.missing_before(number) for number in taken})
             elif self._ring is not None:
                 self._ring.frames.clear()
+
+    def _catch_up(self, follower: Follower, later: list[tuple[int, FloatArray, FloatArray | None]]) -> None:
+        for number, mean, doubt in later:
+            follower.add(number, mean, doubt)
+        if follower.state == "lost":
+            self._look_behind(follower)
 
     def _look_later(self, why: str) -> None:
         self.why = why
