@@ -9,6 +9,7 @@ import pytest
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.judging import Judging
 from psvideo.solve.normals.trust.moving_doubt import (
     MOST_DEG,
     Checked,
@@ -119,6 +120,14 @@ def test_what_all_around_is_turned_counts_more_than_its_own_angle() -> None:
     turned, known = np.full((SIDE, SIDE), 6, np.float32), np.ones((SIDE, SIDE), np.float32)
     doubt = moving_doubt_deg(turned, np.zeros_like(turned), known)
     np.testing.assert_allclose(doubt, HOW.own * 6 + 6 * 6 / HOW.around_deg, rtol=1e-4)
+
+
+@pytest.mark.parametrize("angle_deg", [40.0, 1e6])
+def test_however_far_plates_disagree_a_normal_lies_no_farther_off_than_one_of_them_shows(angle_deg: float) -> None:
+    turned, known = np.full((SIDE, SIDE), angle_deg, np.float32), np.ones((SIDE, SIDE), np.float32)
+    doubt = moving_doubt_deg(turned, np.zeros_like(turned), known)
+    np.testing.assert_allclose(doubt, HOW.most_deg)
+    assert HOW.most_deg > 4 * Judging().most_error_deg, "none of it is trusted"
 
 
 def puzzled_by(left: float) -> Checked:
