@@ -206,6 +206,10 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "lights behind": (lambda: ps.solve_images(GOOD, DIRECTIONS * [1, 1, -1]), "change the sign of z"),
     "two lights": (lambda: ps.solve_images(GOOD[:2], DIRECTIONS[:2]), "at least three lights, and here are 2"),
     "a light more": (lambda: ps.solve_images(GOOD[:3], DIRECTIONS), "3 images .* and 4 lights"),
+    "three lights for colours": (
+        lambda: ps.solve_images(np.repeat(np.asarray(GOOD)[..., None], 3, axis=-1), DIRECTIONS[:3]),
+        r"4 images .* and 3 lights.*in the same order\.$",
+    ),
     "in a plane": (lambda: ps.solve_images(GOOD[:3], [[0.6, 0, 0.8], [0.0, 0, 1], [-0.6, 0, 0.8]]), "in one plane"),
     "turned": (lambda: ps.solve_images(GOOD, DIRECTIONS.T), "give directions.T"),
     "no unit": (lambda: ps.solve_images(GOOD, 2 * DIRECTIONS), "number 0 has length 2"),

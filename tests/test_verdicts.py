@@ -5,12 +5,14 @@ from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from psvideo.clip import Masks
 from psvideo.clip.transfer import stops_unused
 from psvideo.model.camera import Camera, Encoding
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
@@ -21,6 +23,7 @@ from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round
+from psvideo.report.html import _timing
 from psvideo.report.judge import of_motion, of_rows, of_timing, result
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_ambient import ambient
@@ -916,3 +919,107 @@ def test_what_is_not_known_of_near_lights_distance_is_said_and_not_laid_upon_the
     (lacking,) = validity(one)
     assert ("line on distance" in lacking.advice) is bool(grades)
     assert [line.grade for line in accuracy(one)] == ["good"]
+
+
+def even(light: str, level: float, *, unseen: slice = slice(0), clips: float = 0.0) -> LightPlate:
+    """A plate that is as bright everywhere, of which no frame saw some rows, and a share of whose columns clips."""
+    image, seen = np.full((SIZE, SIZE), level, np.float32), np.ones(SIZE, np.bool_)
+    image[:, : round(clips * SIZE)], seen[unseen] = 1.0, False
+    picture = mixture_of(image * np.float32(1) * seen[:, None])
+    return LightPlate(light=light, number=1001, time_s=0.0, picture=picture, seen=seen)
+
+
+def looked_at(plates: Sequence[LightPlate], dark: LightPlate | None = None, masks: Masks | None = None) -> Observed:
+    observed = Observed(lights=tuple(plate.light for plate in plates), masks=masks)
+    observed.add(Round(number=1001, plates=tuple(plates), ambient=dark))
+    return observed
+
+
+@pytest.mark.parametrize(
+    ("unseen", "dark_unseen"), [((0, 0), 0), ((SIZE, SIZE), 0), ((0, 0), SIZE // 2), ((SIZE, 8), SIZE // 4)]
+)
+def test_ambient_lights_share_is_of_what_was_seen(unseen: tuple[int, int], dark_unseen: int) -> None:
+    plates = [even("a", 0.46), *(even(name, 0.46, unseen=slice(rows)) for name, rows in zip("bc", unseen, strict=True))]
+    observed = looked_at(plates, even(AMBIENT, 0.04, unseen=slice(dark_unseen)))
+    assert observed.facts[0].ambient == pytest.approx(0.08)
+
+
+def test_what_is_dim_where_no_frame_saw_the_dark_slot_does_not_make_it_uneven() -> None:
+    lit = LightPlate(
+        light="a", number=1001, time_s=0.0, seen=np.ones(SIZE, np.bool_),
+        picture=mixture_of(np.tile(np.linspace(0.1, 0.9, SIZE, dtype=np.float32), (SIZE, 1))),
+    )  # fmt: skip
+    observed = looked_at([lit], even(AMBIENT, 0.04, unseen=slice(SIZE // 2)))
+    assert observed.dark_evenness[0] == pytest.approx(1)
+
+
+def test_the_share_that_clips_is_of_what_was_seen() -> None:
+    observed = looked_at([even("a", 0.5, unseen=slice(SIZE // 2), clips=0.25), even("b", 0.5)])
+    assert observed.facts[0].clipped == (0.25, 0.0)
+    assert observed.levels("a").clipped_share == pytest.approx(0.25)
+
+
+def test_rows_that_nobody_saw_are_not_borrowed() -> None:
+    shown_s = np.zeros(SIZE)
+    shown_s[24:36] = 1.0
+    plate = replace(even("a", 0.5, unseen=slice(24)), shown_s=shown_s)
+    assert looked_at([plate]).facts[0].borrowed_share == pytest.approx(12 / SIZE)
+
+
+@pytest.mark.parametrize(("opened", "mode", "said"), [(0.9, "rolling", False), (1.0, "synced", True)])
+def test_rows_that_a_closed_shutter_costs_are_not_laid_to_a_missing_frame(opened: float, mode: str, said: bool) -> None:
+    timing = timing_of(exposure_s=0.01 * opened, dropped_frames=(DroppedFrames(after=3, count=1),))
+    one = Observed(lights=("a",), facts=KeptFacts([facts_of(unseen_share=0.1)] * 12))
+    lines = list(of_rows.coverage(plan_of(("a",), mode=mode, dark_s=0.01), timing, one))
+    assert ("spoils 12 of 12 rounds" in next(line.found for line in lines if line.subject == "frames")) == said
+
+
+def test_lamps_are_not_said_to_fire_where_nothing_is_lit() -> None:
+    one = looked_at([even(name, 0.0) for name in "abc"])
+    assert [line.subject for line in (*exposure(one), *lamps(one))] == ["exposure"]
+
+
+def test_a_mask_that_slips_between_the_points_looked_at_is_not_called_dark() -> None:
+    mask = np.zeros((SIZE, SIZE), np.bool_)
+    mask[:, 13:16] = True
+    one = looked_at([even(name, 0.5) for name in "abc"], masks=Masks(still=mask))
+    assert [(line.subject, line.grade) for line in (*exposure(one), *lamps(one))] == [("mask", "doubtful")]
+    solved = Surface(
+        normals=np.tile(np.array([0, 0, 1], np.float32), (SIZE, SIZE, 1)),
+        albedo=np.ones((SIZE, SIZE), np.float32),
+        valid=mask,
+    )
+    one.add(Round(number=1002, plates=tuple(even(name, 0.5) for name in "abc")), solved)
+    assert one.facts[1].valid_share is None
+
+
+@pytest.mark.parametrize(("moving", "named"), [(0.0, ["a", "b"]), (0.3, []), (None, [])])
+def test_lamps_flicker_only_where_it_is_known_that_nothing_moves(moving: float | None, named: list[str]) -> None:
+    levels = 0.3 * (1 + 0.1 * np.sin(1.9 * np.arange(10)))
+    facts = [
+        facts_of(levels=(level, level), clipped=(0.0,) * 2, white=(1.0,) * 2, moving_share=moving) for level in levels
+    ]
+    said = [
+        line.found for line in lamps(Observed(lights=("a", "b"), facts=KeptFacts(facts))) if "flickers" in line.found
+    ]
+    assert [line.split("'")[1] for line in said] == named
+
+
+def test_one_light_is_not_compared_with_itself() -> None:
+    assert [line.found for line in lamps(looked_at([even("a", 0.5)]))] == ["The light fires in every round."]
+
+
+@pytest.mark.parametrize(
+    ("known", "words"),
+    [
+        ({"row_time_s": 0.0, "phase_error_rows": 0.05, "phase_error_s": 2e-6}, "2 us"),
+        ({"phase_error_rows": 0.05, "phase_error_s": 5e-6}, "5 us, 0.05 row"),
+        ({"phase_error_rows": 0.05}, "0.05 row"),
+        ({"phase_error_rows": 0.0}, "not fitted"),
+    ],
+)
+def test_the_report_says_how_sure_flash_times_are_as_the_timing_does(known: dict[str, float], words: str) -> None:
+    timing = timing_of(**known)
+    report: Any = SimpleNamespace(timing=timing)
+    assert f"<td>{words}</td>" in _timing(report)
+    assert timing.how_sure == ("" if words == "not fitted" else f"Flash times are known to {words}.")

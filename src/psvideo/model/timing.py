@@ -98,11 +98,16 @@ class Timing:
     @property
     def how_sure(self) -> str:
         """One sentence on how certain the flashes' times are; empty where nothing was fitted."""
+        return f"Flash times are known to {self.known_to}." if self.known_to else ""
+
+    @property
+    def known_to(self) -> str:
+        """How certain the flashes' times are, in seconds and rows; empty where nothing was fitted."""
         rows = f"{self.phase_error_rows:.2g} row"
         if self.phase_error_s is None:
-            return f"Flash times are known to {rows}." if self.phase_error_rows else ""
+            return rows if self.phase_error_rows else ""
         times = show_seconds(self.phase_error_s, figures=2)
-        return f"Flash times are known to {times}, {rows}." if self.row_time_s else f"Flash times are known to {times}."
+        return f"{times}, {rows}" if self.row_time_s else times
 
     @property
     def pulse(self) -> Pulse:

@@ -80,7 +80,7 @@ def _timing(report: RunReport) -> str:
     readout_s = abs(timing.row_time_s)
     facts = {
         "Flashes": f"{len(timing.flashes)}, of which {complete} complete",
-        "Flash times known to": f"{timing.phase_error_rows:.2g} row",
+        "Flash times known to": timing.known_to or "not fitted",
         "Strobe's clock": f"{timing.clock_offset_ppm:+.1f} ppm off the camera's",
         "Order of the lights": f"{timing.order}. {timing.order_note}".strip(" ."),
         "Exposure": f"{timing.exposure_s * 1e3:.4g} ms ({360 * timing.exposure_s / timing.frame_period_s:.0f} degrees)",

@@ -162,7 +162,7 @@ def check_count(lights: int, stack: Images) -> None:
     if lights == len(stack):
         return
     more = ""
-    if lights == stack.shape[-1]:
+    if stack.ndim == 3 and lights == stack.shape[-1]:
         more = " The last axis of the images has that length: give np.moveaxis(images, -1, 0)."
     raise UsageError(
         f"There are {len(stack)} images (shape {stack.shape}, the light first) and {lights} lights. Expected one light "

@@ -10,6 +10,7 @@ from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.thinned import slips
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
 
 DIM_STOPS, DARK_STOPS = -3.5, -6.0
@@ -31,6 +32,15 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
     """Judge how bright the brightest lamp's plates are, and how much each lamp clips; ``unused_stops``: by how many the
     largest code lies above all that a camera records."""
     levels = {light: observed.levels(light) for light in observed.lights if light in observed.counts}
+    if not any(one.total for one in levels.values()) and _mask_slips(observed):
+        yield Judgement(
+            subject="mask",
+            grade="doubtful",
+            found="The mask is too small to be judged: this report looks at every fourth row and column, or fewer of "
+            "large pictures, and none of its points lies in the mask.",
+            advice="Look at the results themselves, or paint the mask wider.",
+        )
+        return
     if not any(one.total for one in levels.values()):
         yield Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
         return
@@ -65,6 +75,11 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
             "clipped.",
         )
     yield from clipped
+
+
+def _mask_slips(observed: Observed) -> bool:
+    """Whether the first round's mask lies between the points that are looked at."""
+    return observed.masks is not None and bool(observed.facts) and slips(observed.masks.at(observed.facts[0].number))
 
 
 def _reach(top_stops: float, under: str) -> str:

@@ -43,18 +43,20 @@ def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> It
         said += _missed(observed.lights, shown, level[whole], usual, alive)
         said += _unsteady(observed.lights, shown, level[whole], usual, alive)
     yield from said
-    if not said:
-        spread = -np.log2(max(relative[known].min(), 1e-9))
-        yield Judgement(
-            subject="lights",
-            grade="good",
-            found=f"{_all(len(named), len(known))} fire{' in every round' if timed and whole.all() else ''}; the "
-            f"weakest gives {abs(spread):.1f} stops less than the strongest.",
-        )
+    if not said and relative.max() > 0:  # else nothing is lit, which is said once
+        always = " in every round" if timed and whole.all() else ""
+        yield Judgement(subject="lights", grade="good", found=_all_fire(relative[known], len(known), always))
 
 
-def _all(seen: int, lights: int) -> str:
-    return f"All {lights} lights" if seen == lights else f"The {seen} of {lights} lights that were seen"
+def _all_fire(relative: NDArray[np.float64], lights: int, always: str) -> str:
+    """Say that all lights of which anything was seen fire, and by how much they differ."""
+    if len(relative) == 1:
+        return f"The {'light' if lights == 1 else f'one of {lights} lights that was seen'} fires{always}."
+    seen = (
+        f"All {lights} lights" if len(relative) == lights else f"The {len(relative)} of {lights} lights that were seen"
+    )
+    spread = abs(-np.log2(max(relative.min(), 1e-9)))
+    return f"{seen} fire{always}; the weakest gives {spread:.1f} stops less than the strongest."
 
 
 def _levels(facts: Sequence[InstantFacts]) -> NDArray[np.float64]:
@@ -195,8 +197,8 @@ def _unsteady(
     usual: NDArray[np.float64],
     alive: NDArray[np.bool_],
 ) -> Iterator[Judgement]:
-    """Say which lamps change from round to round while nothing moves."""
-    still = np.array([not one.moving_share for one in facts[1:]], bool)
+    """Say which lamps change from round to round while nothing moves, as far as that is known."""
+    still = np.array([one.moving_share == 0 for one in facts[1:]], bool)
     steps = np.abs(np.diff(level, axis=0))[still]
     if len(steps) < 4:
         return

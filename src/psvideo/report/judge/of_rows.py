@@ -34,7 +34,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
     if take_s is not None and without_dark:
         unseen = 0.0  # more frames show the ambient light of more rows
     said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
-    holes = list(_dropped(timing, observed))
+    holes = list(_dropped(timing, observed, alone=not (without_dark or _is_blind(timing))))
     explained = bool(said) or (bool(timing.dropped_frames) and unseen <= LOST_UNSEEN)
     if unseen > MOST_UNSEEN and not explained and without_dark:
         said.append(
@@ -124,13 +124,14 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterat
         )
 
 
-def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
+def _dropped(timing: Timing, observed: Observed, *, alone: bool) -> Iterator[Judgement]:
+    """Say which frames are missing or repeat, and how many rounds that spoils where rows lack for that ``alone``."""
     holes, again = timing.dropped_frames, timing.repeated_frames
     missing = sum(hole.count for hole in holes)
     spoilt = [one.number for one in observed.facts if one.unseen_share > 0]
     if missing:
         where = listed([f"{hole.count} after number {hole.after}" for hole in holes], NAMED, things="places")
-        grave = len(spoilt) > 0.1 * max(len(observed.facts), 1) and len(spoilt) > 1
+        grave = alone and len(spoilt) > 0.1 * max(len(observed.facts), 1) and len(spoilt) > 1
         yield Judgement(
             subject="frames",
             grade="doubtful",

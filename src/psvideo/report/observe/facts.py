@@ -12,7 +12,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import Round
 from psvideo.report.observe.motion import Motion
 from psvideo.report.observe.steadiness import Change
-from psvideo.report.observe.thinned import step_of, thin_surface, thinned
+from psvideo.report.observe.thinned import slips, step_of, thin_surface, thinned
 from psvideo.solve.filling.filled import holes_in
 from psvideo.solve.passes.alpha_matte import lit_from
 
@@ -29,9 +29,10 @@ class InstantFacts:
     frame saw; ``borrowed_share`` is that of rows that other rounds showed. A void background counts as neither.
     ``change`` is what differs from the result before, at rest.
 
-    ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, the latter
-    where nothing was filled as well. ``levels`` (light) is each light's mean on the subject, 1.0 = saturation;
-    ``clipped`` (light) the share of it that is saturated, ``white`` (light) the light at which its plate is.
+    ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, or a mask
+    slips between the points that are counted, the latter where nothing was filled as well. ``levels`` (light) is each
+    light's mean on the subject, 1.0 = saturation; ``clipped`` (light) the share of what was seen of it that is
+    saturated, ``white`` (light) the light at which its plate is.
     ``ambient`` is the ambient light's share of what an exposure holds. ``speed_px_s`` is how fast the fastest parts
     move, and ``moving_share`` how much of the picture does; None where it is not known. What changes too fast to be
     followed has a share and no speed.
@@ -67,6 +68,15 @@ class Seen:
     beyond: float = 0.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Dark:
+    """The ambient light of one exposure, thinned: its brightest channel, ``level``, and where it is ``known``, both
+    (row, col)."""
+
+    level: NDArray[np.float32]
+    known: NDArray[np.bool_]
+
+
 def thinned_round(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     """Return a round thinned out, and where its subject is."""
     step = step_of(*one.plates[0].shape[:2])
@@ -95,19 +105,19 @@ def instant_facts(
     *,
     seen: Seen | None = None,
     moving: Motion | None = None,
-    dark: NDArray[np.float32] | None = None,
+    dark: Dark | None = None,
 ) -> InstantFacts:
     """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``dark`` the
-    ambient light of one exposure, thinned out as ``seen`` is."""
+    ambient light, thinned out as ``seen`` is. Of a mask that holds none of the points, nothing is known."""
     seen = seen or thinned_round(one, mask)
     subject, bright = seen.subject, seen.bright
-    count = max(int(subject.sum()), 1)
-    valid, measured = _shares(surface, subject)
-    shares, levels = [], []
-    for picture, shown, plate in zip(bright, seen.shown, one.plates, strict=True):
-        shares.append(float(((picture >= plate.saturation) & subject).sum() / count))
-        light = picture[subject & shown]
-        levels.append(float(light.mean()) if light.size else 0.0)
+    valid, measured = (None, None) if slips(mask) else _shares(surface, subject)
+    lights = [picture[subject & shown] for picture, shown in zip(bright, seen.shown, strict=True)]
+    whites = [plate.saturation for plate in one.plates]
+    shares = [
+        float((light >= white).mean()) if light.size else 0.0 for light, white in zip(lights, whites, strict=True)
+    ]
+    levels = [float(light.mean()) if light.size else 0.0 for light in lights]
     return InstantFacts(
         number=one.number,
         time_s=one.time_s,
@@ -117,10 +127,10 @@ def instant_facts(
         unseen_share=float(np.mean([1 - plate.lines_seen.mean() for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
         change=change,
-        levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
+        levels=tuple(level / white for level, white in zip(levels, whites, strict=True)),
         clipped=tuple(shares),
-        white=tuple(plate.saturation for plate in one.plates),
-        ambient=_ambient_share(dark, subject, levels),
+        white=tuple(whites),
+        ambient=_ambient_share(dark, subject, [float(light.mean()) for light in lights if light.size]),
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
@@ -150,9 +160,10 @@ def _borrowed(plate: LightPlate) -> float:
     return float((counts.sum() - own) / shown_s.size)
 
 
-def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
-    """Return which share of what a row under one light holds is ambient light, in the mean over subject and lights."""
-    if dark is None or not subject.any():
+def _ambient_share(dark: Dark | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
+    """Return which share of what a row under one light holds is ambient light, in the mean over subject and lights, of
+    what was seen of either."""
+    if dark is None or not levels or not (subject & dark.known).any():
         return None
-    level = max(float(dark.mean(where=subject)), 0.0)
+    level = max(float(dark.level.mean(where=subject & dark.known)), 0.0)
     return level / max(level + float(np.mean(levels)), 1e-9)

@@ -21,7 +21,7 @@ from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.observe.alignment.astray import Astray, astray
-from psvideo.report.observe.facts import FAINT, Seen, instant_facts, thinned_round
+from psvideo.report.observe.facts import FAINT, Dark, Seen, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
@@ -95,7 +95,7 @@ class Observed:
     _first: dict[str, Glimpse] = field(default_factory=dict)
     _glimpse: Glimpse | None = None
     _sample: Sample | None = None
-    _dark: NDArray[np.float32] | None = None
+    _dark: Dark | None = None
     _moving: Motion | None = None
     _passed: bool = False
     _fit: tuple[tuple[int, bytes], RigFit | None] | None = field(default=None, init=False)
@@ -125,11 +125,15 @@ class Observed:
 
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames showed without a dark slot."""
-        self._dark = np.array(brightest_channel(thinned(found.image)))
+        known = np.repeat(found.known[:, None], found.image.shape[1], axis=1)
+        self._dark = Dark(level=np.array(brightest_channel(thinned(found.image))), known=thinned(known))
         self.ambient_measured[found.begins] = float(found.stood.mean())
 
     def _look_at_dark(self, plate: LightPlate) -> None:
-        self._dark = np.array(brightest_channel(plate.picture.thinned(step_of(*plate.shape[:2]))))
+        step = step_of(*plate.shape[:2])
+        known = np.array(plate.pixels_seen[::step, ::step])
+        if known.any():
+            self._dark = Dark(level=np.array(brightest_channel(plate.picture.thinned(step))), known=known)
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
@@ -151,7 +155,8 @@ class Observed:
         yield
         self.beyond_mask.append(seen.beyond)
         if self._dark is not None:
-            self.dark_evenness.append(_evenness(self._dark) if _evenness(seen.bright.max(axis=0)) < UNEVEN else 0.0)
+            shown = self._dark.level[self._dark.known]
+            self.dark_evenness.append(_evenness(shown) if _evenness(seen.bright.max(axis=0)) < UNEVEN else 0.0)
         if not self._passed:
             for plate in one.plates:
                 self._glance(plate)

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import thin
@@ -25,6 +26,11 @@ def step_of(rows: int, cols: int) -> int:
 def thinned(picture: NDArray[Any]) -> NDArray[Any]:
     """Return the rows and columns of a picture (row, col[, channel]) that are looked at, as a picture of its own."""
     return thin(picture, step_of(*picture.shape[:2]))
+
+
+def slips(mask: NDArray[np.bool_] | None) -> bool:
+    """Return whether a mask holds a part of the picture and none of the points that are looked at."""
+    return mask is not None and bool(mask.any()) and not thinned(mask).any()
 
 
 def thin_surface(surface: Surface) -> Surface:
