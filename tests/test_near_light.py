@@ -276,6 +276,22 @@ def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
     assert swept(near, few.lights, plates[:4]) is near, "four lights do not tell distance from normal"
 
 
+def test_one_clipped_channel_says_nothing_of_how_light_falls_off() -> None:
+    """A red wall on the plane whose red clips before each lamp, where its channels' mean is half of saturation."""
+    ways = [(0.5 * np.cos(a), 0.5 * np.sin(a), 0.05) for a in np.arange(6) * np.pi / 3]
+    lights = tuple(Light(name=f"L{n}", position_m=at, intensity=(1.5,)) for n, at in enumerate(ways))
+    rig = Rig(lights=lights, focal_px=(80.0, 80.0), principal_px=(39.5, 29.5), plane=(0.0, 0.0, 1.0, 1.0))
+    x, y = np.meshgrid((np.arange(80) - 39.5) / 80, (29.5 - np.arange(60)) / 80)
+    points, normal = np.stack([x, y, -np.ones_like(x)], axis=-1), np.array([0.0, 0.0, 1.0])
+    grey = np.stack(filmed(rig, points, normal, albedo=1.0))
+    red = np.minimum(grey[..., None] * np.array([0.9, 0.3, 0.2], np.float32), 1)
+    assert (red[..., 0] == 1).mean() > 0.25
+    assert red.mean(axis=-1).max() < 0.6
+    found = ps.solve_images(red, rig)
+    assert np.degrees(np.linalg.norm(found.normals - normal, axis=-1)).max() < 0.1
+    assert found.valid.mean() > 0.7
+
+
 def test_distant_lights_may_stand_among_near_ones_and_a_far_light_is_a_distant_one() -> None:
     points, normals = surface(relief)
     near = ring_rig(4, 2)

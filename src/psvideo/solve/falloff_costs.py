@@ -21,10 +21,9 @@ OWN_SHARE = 0.005
 
 
 def light_at(plates: Plates, step: int, seen: NDArray[np.bool_] | None) -> NDArray[np.float64]:
-    """Return every ``step``-th row and column of all plates, their channels' mean, (row, col, light); -1 where it is
-    clipped or was not seen. ``seen``: (light, row) or (light, row, col)."""
+    """Return every ``step``-th row and column of all plates, their channels' mean, (row, col, light); -1 where any of
+    these is clipped, or where it was not seen. ``seen``: (light, row) or (light, row, col)."""
     light = np.stack([_thin(plate, step) for plate in plates], axis=-1).astype(np.float64)
-    light[light >= SATURATED - LOSSY_MARGIN] = -1
     if seen is not None:
         shown = seen[:, ::step, None] if seen.ndim == 2 else seen[:, ::step, ::step]
         light[~np.broadcast_to(np.moveaxis(shown, 0, -1), light.shape)] = -1
@@ -82,7 +81,9 @@ def falloff_costs(
 
 
 def _thin(plate: Samples | Mixture, step: int) -> NDArray[np.float32]:
-    """Return every nth row and column of a plate, (row, col), its channels' mean."""
+    """Return every nth row and column of a plate, (row, col), its channels' mean; -1 where any channel is clipped."""
     some = plate.thinned(step) if isinstance(plate, Mixture) else plate[::step, ::step]
     some = np.asarray(some, np.float32)
-    return some if some.ndim == 2 else mean_of_channels(some)
+    by_channel = some[..., None] if some.ndim == 2 else some
+    clipped = (by_channel >= SATURATED - LOSSY_MARGIN).any(axis=-1)
+    return np.where(clipped, np.float32(-1), some if some.ndim == 2 else mean_of_channels(some))
