@@ -1,6 +1,7 @@
 """Lights measured on matte spheres, white targets and any matte scene; and guessed where nothing was calibrated."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from picture_file import read_picture
 
+import psvideo as ps
 from psvideo.calibrate.cho2020 import measure_strengths
-from psvideo.calibrate.flat_field import Target, measure_flat_field
+from psvideo.calibrate.flat_field import Target, measure_flat_field, with_intensities
 from psvideo.calibrate.guess import guess_rig
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
@@ -23,10 +25,31 @@ from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.model.choices import Prior
 from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
+from psvideo.runs.calibrate.flat_field import flat_field, white_target
 
 Array = NDArray[np.float64]
 HIGH, WIDE = 150, 200
 CIRCLE = (95.3, 71.8, 60.0)
+WALL = """
+schema = "psvideo-scene/1"
+name = "wall"
+frames = 12
+seed = 3
+[camera]
+width_px = 64
+height_px = 48
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.0081
+width_m = 0.5
+[strobe]
+flash_s = 0.0007
+[[object]]
+mesh = "plane"
+scale = 2
+albedo = 0.6
+casts_shadow = false
+"""
 
 
 def ways(count: int, *, seed: int = 0) -> Array:
@@ -167,6 +190,65 @@ def test_a_white_target_shows_intensities_and_leaves_only_falloff_that_the_rig_d
         rig.names, [image * (1 - 2 * (x**2 + y**2))[..., None].astype(np.float32) for image in images]
     )
     assert min(light.falloff for light in measure_flat_field(vignetted, rig, target, ground=ground)) > 0.05
+
+
+CARD = Target(albedo=0.9, normal=np.array([0.0, 0.0, 1.0]), rows=slice(0, 24), cols=slice(0, 32))
+WAYS = ((0.6, 0.0, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.6, 0.8))
+
+
+def card(seen: Array) -> LightPictures:
+    """A white card that faces the camera under lights whose strengths the channels see so, (light, channel)."""
+    images = [np.full((24, 32, 3), 0.9 * way[2] * one, np.float32) for way, one in zip(WAYS, seen, strict=True)]
+    return light_pictures("abc", images)
+
+
+def test_what_is_measured_takes_the_place_of_colour_and_of_the_flash_that_the_old_strength_was_for() -> None:
+    seen = np.array([(1.0, 0.5, 0.2), (0.1, 0.8, 0.1), (0.05, 0.2, 0.9)])
+    lights = tuple(
+        Light(name=name, direction=way, intensity=(2.0,), colour=tuple(one), reference_duration_s=0.0016)
+        for name, way, one in zip("abc", WAYS, seen, strict=True)
+    )
+    rig, pictures = Rig(lights=lights), card(seen)
+    strengths = [light.intensity.tolist() for light in measure_flat_field(pictures, rig, CARD)]
+    for flashes_s in (None, (0.0008, 0.0008, 0.0004)):
+        measured = with_intensities(rig, strengths, replace(pictures, flashes_s=flashes_s)).lights
+        np.testing.assert_allclose([light.by_channel for light in measured], seen, rtol=1e-4)
+        assert all(light.colour is not None for light in measured), "flashes of several colours are still told apart"
+        assert [light.reference_duration_s for light in measured] == list(flashes_s or [None] * 3)
+
+
+def test_a_clip_says_for_how_long_the_lights_shone_whose_strengths_it_shows(tmp_path: Path) -> None:
+    lights = "".join(f'[[light]]\nname = "{n}"\ndirection = {list(w)}\n' for n, w in zip("abc", WAYS, strict=True))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(WALL + lights)
+    clip = ps.shoot(scene, tmp_path / "clip").path
+    true = read_rig(clip / "rig.toml")
+    other = [replace(light, intensity=(7.0,), reference_duration_s=0.003) for light in true.lights]
+    (tmp_path / "rig.toml").write_text(format_rig(Rig(lights=tuple(other))))
+    found = flat_field(clip, rig=tmp_path / "rig.toml", out=tmp_path / "found.toml", albedo=0.6).rig
+    for light, one in zip(found.lights, true.lights, strict=True):
+        assert light.reference_duration_s == one.reference_duration_s == 0.0007
+        np.testing.assert_allclose(light.intensity, one.intensity[0], rtol=0.02)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_plane_is_the_same_with_either_sign(sign: float) -> None:
+    rig = Rig(lights=(), plane=(0.2 * sign, 0.0, sign, 1.2 * sign))
+    lights = tuple(Light(name=name, direction=way) for name, way in zip("abc", WAYS, strict=True))
+    known, pictures = replace(rig, lights=lights), card(np.ones((3, 3)))
+    target, _ = white_target(pictures, known, Path("rig.toml"), albedo=0.9, box=None)
+    np.testing.assert_allclose(target.normal, np.array([0.2, 0, 1]) / np.hypot(0.2, 1))
+
+
+@pytest.mark.parametrize("cosine", [0.2, 0.04, 0.001])
+def test_a_light_that_only_grazes_the_target_is_refused_and_one_above_it_is_measured(cosine: float) -> None:
+    rig = Rig(lights=(Light(name="a", direction=(float(np.sqrt(1 - cosine**2)), 0.0, cosine)),))
+    pictures = light_pictures("a", [np.full((24, 32), 0.9 * cosine, np.float32)])
+    if cosine > 0.05:
+        assert measure_flat_field(pictures, rig, CARD)[0].intensity == pytest.approx(1)
+        return
+    with pytest.raises(PsvideoError, match="behind the white target, or just at its edge"):
+        measure_flat_field(pictures, rig, CARD)
 
 
 def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> None:

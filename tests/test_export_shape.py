@@ -12,9 +12,11 @@ import pytest
 import tomlkit
 import trimesh
 
+import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.export.mesh_files import srgb_codes, write_part, write_ply
+from psvideo.export.sequences.planes import InstantPictures
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.usd import require_usd
 from psvideo.export.usd.usd_animation import write_animation
@@ -113,6 +115,23 @@ def run(clip: Path, out: Path, *more: str) -> int:
 
 def channels(path: Path) -> dict[str, np.ndarray]:
     return {name: c.pixels for name, c in OpenEXR.File(str(path), separate_channels=True).channels().items()}
+
+
+def test_what_lies_nearer_than_relative_depth_0_has_a_place_in_the_world() -> None:
+    """Without a lens depth is relative to the middle: a wall that leans far back passes 0."""
+    normals = np.broadcast_to(np.array([0, np.sin(1.0), np.cos(1.0)], np.float32), (96, 40, 3))
+    known = np.ones((96, 40), np.bool_)
+    known[:, :8] = False
+    surface = ps.Surface(normals=normals * known[..., None], albedo=known.astype(np.float32), valid=known)
+    depth = ps.find_depth(surface)
+    assert (depth.depth < 0).mean() > 0.1
+    world = Space(name="world", camera_to_world=TURNED, origin=np.array([1.0, 2.0, 3.0]))
+    placed = InstantPictures(surface=surface, space=world, depth=depth).position
+    camera = InstantPictures(surface=surface, space=Space(), depth=depth).position
+    assert placed is not None
+    assert camera is not None
+    np.testing.assert_allclose(placed[known], camera[known] @ TURNED.T + [1, 2, 3], atol=1e-5)
+    assert not placed[~known].any()
 
 
 SHAPE = ("--aov", "depth", "--aov", "position", "--mesh", "ply")

@@ -1,14 +1,19 @@
 """Lights calibrated on spheres in strobed clips, and normals solved with the rigs that came out of it."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import OpenEXR
 import pytest
 
+from psvideo.calibrate.mirror.sighting import Sighting
+from psvideo.calibrate.sphere.outline import given_outline
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.cli.app import main
 from psvideo.formats.rig_toml import read_rig
+from psvideo.runs.photographs.still_rig import plane_of
 
 SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
 MATTE = '[[object]]\nmesh = "sphere"\nalbedo = 0.8\n'
@@ -92,6 +97,23 @@ focal_px = 500.0
 [strobe]
 flash_s = 0.001
 """
+
+
+@pytest.mark.parametrize("off_deg", [0, 15, 30])
+def test_the_surface_is_as_far_as_the_sphere_wherever_in_the_picture_it_stands(off_deg: float) -> None:
+    """Rays along the rim of a ball whose middle is 0.8 m deep, seen by a pinhole."""
+    view, radius_m = SphereView(focal_px=1000.0, principal_px=(999.5, 749.5)), 0.02
+    middle = 0.8 * np.array([np.tan(np.radians(off_deg)), 0.1, -1.0])
+    away_m = np.linalg.norm(middle)
+    axis = middle / away_m
+    across = np.cross(axis, [0, 1, 0]) / np.linalg.norm(np.cross(axis, [0, 1, 0]))
+    turn = np.linspace(0, 2 * np.pi, 100)[:, None]
+    rim = axis + np.tan(np.arcsin(radius_m / away_m)) * (np.cos(turn) * across + np.sin(turn) * np.cross(axis, across))
+    place = view.through(view.project(rim))
+    assert place is not None
+    outline = replace(given_outline(view, (0, 0, 1)), place=place)
+    seen = Sighting(where="ball", outline=outline, highlights=(), picture=np.zeros((2, 2), np.float32), sets=1)
+    assert plane_of([seen], radius_m) == pytest.approx((0, 0, 1, 0.8), rel=1e-4)
 
 
 def test_two_chrome_balls_in_a_strobed_clip_show_where_near_lights_are(tmp_path: Path) -> None:

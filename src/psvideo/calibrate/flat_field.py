@@ -16,12 +16,15 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.irradiance.falloff import POWERS, Falloff, terms
 from psvideo.model.irradiance.ground import Ground
+from psvideo.model.irradiance.intensity import with_measured
 from psvideo.model.irradiance.near_light import field_of
 from psvideo.model.rig import Light, Rig
 
 LEAST_SHARE = 0.5
 """Share of the target's pixels that must be unsaturated and seen."""
 LEAST_COSINE = 0.05
+"""Of the angle between a target and a light: at this one, a direction wrong by a degree costs a third of the intensity,
+and at less any share of it."""
 MOST_ERROR = 0.5
 """Intensities less certain than this share of themselves are none: no flat target differs so much from row to row."""
 MOST_PIXELS = 20_000
@@ -105,11 +108,13 @@ def _from_blocks(at: NDArray[np.intp], count: int, whole: slice) -> tuple[int, i
     return int(blocks[at.min() + inset][0]), int(blocks[at.max() - inset][-1]) + 1
 
 
-def with_intensities(rig: Rig, found: list[FlatLight]) -> Rig:
-    """Return the rig with the measured intensities; lights that were not in the pictures are left out."""
-    known = {light.name: light for light in rig.lights}
+def with_intensities(rig: Rig, strengths: Sequence[Sequence[float]], pictures: LightPictures) -> Rig:
+    """Return the rig with the intensities measured in some pictures, (light, channel); lights that were not in the
+    pictures are left out."""
+    flashes_s = pictures.flashes_s or [None] * len(pictures.names)
     lights = tuple(
-        replace(known[one.name], intensity=tuple(float(f"{value:.6g}") for value in one.intensity)) for one in found
+        with_measured(light, seen, flash_s=flash_s, coloured=light.colour is not None)
+        for light, seen, flash_s in zip(rig.select(pictures.names), strengths, flashes_s, strict=True)
     )
     return replace(rig, lights=lights)
 
@@ -138,8 +143,9 @@ def on_target(
             f"Light {light.name!r}: {1 - usable.mean():.0%} of the white target is saturated or was not seen; at most "
             f"{1 - least_share:.0%} may be. Expose less, dim the light, or name a part of the picture with `box`."
         )
-    shade = field_of(light, ground, part) @ target.normal
-    if np.min(shade) <= LEAST_COSINE * np.max(np.abs(shade)):
+    field = field_of(light, ground, part)
+    shade = field @ target.normal
+    if np.min(shade) <= LEAST_COSINE * np.max(np.linalg.norm(field, axis=-1)):
         raise PsvideoError(
             f"Light {light.name!r}: by the rig it stands behind the white target, or just at its edge. Check "
             "the light's direction in the rig, or say with the rig's [surface] plane which way the target faces."

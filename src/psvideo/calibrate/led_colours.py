@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.irradiance.colours import CHANNELS, MOST_COLOUR_CONDITION, colour_condition, lamps_of, most_alike
 from psvideo.model.irradiance.ground import Ground
+from psvideo.model.irradiance.intensity import with_measured
 from psvideo.model.rig import Light, Rig
 
 LEAST_SHARE = 0.98
@@ -23,13 +25,15 @@ PATCHES = 4
 class LedColours:
     """What was measured: ``seen`` (light, channel) is intensity times colour, ``error`` its standard error in shares of
     the light's brightest channel; ``condition`` belongs to ``together``, those of the lights that flash at once whose
-    colours are the hardest to tell apart."""
+    colours are the hardest to tell apart. ``flashes_s`` is for how long each light shone, where that is known.
+    """
 
     names: tuple[str, ...]
     seen: FloatArray
     error: FloatArray
     together: tuple[str, ...]
     condition: float
+    flashes_s: tuple[float, ...] | None = None
 
 
 def measure_led_colours(
@@ -52,7 +56,12 @@ def measure_led_colours(
     conditions = [colour_condition(seen[[pictures.names.index(name) for name in group]]) for group in groups]
     worst = int(np.argmax(conditions))
     colours = LedColours(
-        names=pictures.names, seen=seen, error=error, together=groups[worst], condition=conditions[worst]
+        names=pictures.names,
+        seen=seen,
+        error=error,
+        together=groups[worst],
+        condition=conditions[worst],
+        flashes_s=pictures.flashes_s,
     )
     if colours.condition > MOST_COLOUR_CONDITION:
         raise _inseparable(colours)
@@ -61,16 +70,12 @@ def measure_led_colours(
 
 def with_colours(rig: Rig, found: LedColours) -> Rig:
     """Return the rig with the measured colours, the brightest channel 1, and the intensity there."""
-    measured = dict(zip(found.names, found.seen.tolist(), strict=True))
-    return replace(rig, lights=tuple(_coloured(light, measured.get(light.name)) for light in rig.lights))
-
-
-def _coloured(light: Light, seen: Sequence[float] | None) -> Light:
-    if seen is None:
-        return light
-    most = max(seen)
-    red, green, blue = (float(f"{value / most:.5g}") for value in seen)
-    return replace(light, intensity=(float(f"{most:.6g}"),), colour=(red, green, blue))
+    flashes_s = found.flashes_s or [None] * len(found.names)
+    measured = {
+        name: partial(with_measured, seen=seen, flash_s=flash_s, coloured=True)
+        for name, seen, flash_s in zip(found.names, found.seen.tolist(), flashes_s, strict=True)
+    }
+    return replace(rig, lights=tuple(measured[one.name](one) if one.name in measured else one for one in rig.lights))
 
 
 def _measured(

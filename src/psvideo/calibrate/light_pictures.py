@@ -52,6 +52,8 @@ class LightPictures:
         Shape (light, row), False where no frame saw a row; the pictures are 0 there.
     frames
         How many pictures of each light were averaged.
+    flashes_s
+        For how long every light shone, its plan's full flash; None where that is not known, as of photographs.
     """
 
     names: tuple[str, ...]
@@ -60,6 +62,7 @@ class LightPictures:
     seen: NDArray[np.bool_]
     ambient: NDArray[np.float32] | None = None
     frames: int = 1
+    flashes_s: tuple[float, ...] | None = None
 
     @property
     def height_px(self) -> int:
@@ -103,9 +106,9 @@ def light_pictures(
     )
 
 
-def pictures_of_round(one: Round) -> LightPictures:
+def pictures_of_round(one: Round, *, flashes_s: tuple[float, ...] | None = None) -> LightPictures:
     """Return what a round's plates show, from which ambient light was taken; rows count that all of a plate shows."""
-    return light_pictures(
+    pictures = light_pictures(
         one.lights,
         [plate.image for plate in one.plates],
         ambient=None if one.ambient is None else one.ambient.image,
@@ -113,6 +116,7 @@ def pictures_of_round(one: Round) -> LightPictures:
         saturation=[plate.saturation for plate in one.plates],
         seen=np.stack([plate.pixels_seen.all(axis=1) for plate in one.plates]),
     )
+    return replace(pictures, flashes_s=flashes_s)
 
 
 def mean_of_sets(sets: Iterable[LightPictures]) -> LightPictures:

@@ -49,7 +49,7 @@ class InstantPictures:
         if self.depth is None:
             return None
         points = self.depth.view.points(self.depth.depth).astype(np.float32)
-        return placed_points(points, self.space, self.depth.depth > 0)
+        return placed_points(points, self.space, self.depth.valid)
 
 
 def ones_of(mask: NDArray[np.bool_]) -> NDArray[np.float16]:

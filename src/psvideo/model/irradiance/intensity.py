@@ -4,6 +4,7 @@ Every step here comes in a pair: what is done to a light is done to its plates, 
 ``plate = albedo * intensity * max(0, n . direction)`` holds before and after.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.rows.clipping import at_saturation
 
 Image = NDArray[np.float32]
+CHANNELS = 3
 
 
 def measured_duration_s(light: Light, plan: Plan) -> float:
@@ -34,6 +36,20 @@ def _at_full_flash(light: Light, duration_s: float) -> Light:
     if light.reference_duration_s is None:
         return light
     return replace(_times(light, duration_s / light.reference_duration_s), reference_duration_s=duration_s)
+
+
+def with_measured(light: Light, seen: Sequence[float], *, flash_s: float | None, coloured: bool) -> Light:
+    """Return a light as it was measured, in place of what was known of its strength: ``seen`` by every channel.
+
+    ``flash_s`` is for how long it shone, None where that is not known. A ``coloured`` light keeps a colour, whose
+    brightest channel is 1 and has the intensity; it takes three channels.
+    """
+    measured = replace(light, reference_duration_s=flash_s, colour=None)
+    if not coloured or len(seen) != CHANNELS:
+        return replace(measured, intensity=tuple(float(f"{value:.6g}") for value in seen))
+    most = max(seen)
+    red, green, blue = (float(f"{value / most:.5g}") for value in seen)
+    return replace(measured, intensity=(float(f"{most:.6g}"),), colour=(red, green, blue))
 
 
 def per_saturation(light: Light, saturation: float) -> Light:

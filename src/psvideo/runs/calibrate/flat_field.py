@@ -13,6 +13,7 @@ from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
 from psvideo.formats.flat_toml import format_falloff
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.model.camera import FloatArray
 from psvideo.model.irradiance.ground import Ground, ground_of
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
@@ -70,7 +71,7 @@ def flat_field(
     target, ground = white_target(found, known, Path(rig), albedo=albedo, box=box)
     with said_of(pictures):
         lights = measure_flat_field(found, known, target, ground=ground)
-    measured = with_intensities(known, lights)
+    measured = with_intensities(known, [light.intensity.tolist() for light in lights], found)
     write_text(rig_path, format_rig(measured))
     if flat_path is not None:
         write_text(flat_path, format_falloff(falloff_of(lights, target, found)))
@@ -97,9 +98,15 @@ def white_target(
     near = is_near(known.select(found.names))
     with said_of(rig_path):
         ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
-    normal = np.array([0.0, 0.0, 1.0] if known.plane is None else known.plane[:3])
+    normal = _towards_camera((0.0, 0.0, 1.0, 1.0) if known.plane is None else known.plane)
     rows, cols = _part(box, found)
-    return Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols), ground
+    return Target(albedo=albedo, normal=normal, rows=rows, cols=cols), ground
+
+
+def _towards_camera(plane: tuple[float, float, float, float]) -> FloatArray:
+    """Return a plane's unit normal on the camera's side; (a, b, c, d) may have either sign."""
+    normal = np.array(plane[:3]) * (-1.0 if plane[3] < 0 else 1.0)
+    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _part(box: tuple[int, int, int, int] | None, pictures: LightPictures) -> tuple[slice, slice]:

@@ -1,9 +1,10 @@
 """The whole of ``psvideo calibrate intensities``."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from psvideo.calibrate.cho2020 import measure_strengths
+from psvideo.calibrate.flat_field import with_intensities
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import said_of
 from psvideo.formats.rig_toml import format_rig, read_rig
@@ -43,15 +44,10 @@ def intensities(
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
     warn_of_unmeasured(known, found.names, caller)
-    lights = known.select(found.names)
     with said_of(rig):
-        towards = directions(lights)
+        towards = directions(known.select(found.names))
     with said_of(pictures):
         strengths = measure_strengths(found, towards)
-    measured = tuple(
-        replace(light, intensity=tuple(float(f"{value:.6g}") for value in values))
-        for light, values in zip(lights, strengths.intensity.tolist(), strict=True)
-    )
-    made = replace(known, lights=measured)
+    made = with_intensities(known, strengths.intensity.tolist(), found)
     write_text(rig_path, format_rig(made))
     return Intensities(rig=made, error=tuple(float(error) for error in strengths.error))

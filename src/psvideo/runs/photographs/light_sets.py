@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.plan_toml import PLAN_FILE, read_plan
 from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan, reference_duration_s
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
 from psvideo.runs.steps.caller import PYTHON, Caller
@@ -213,7 +215,8 @@ def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
     timing = find_timing(take, first_light=reading.first_light, watch=watch)
     plan = take.plan
     whole = gather(take, timing, aligning=UNMOVED, watch=watch)
-    sets = map(pictures_of_round, islice(whole, None if reading.frames else reading.most))
+    shown = partial(pictures_of_round, flashes_s=_flashes_s(plan))
+    sets = map(shown, islice(whole, None if reading.frames else reading.most))
     guessed = (_guess(take, timing.order_note),) if timing.order == "guess" else ()
     return LightSets(
         name=take.clip.name,
@@ -222,6 +225,11 @@ def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
         warnings=(*take.clip.warnings, *guessed),
         notes=(*take.clip.notes, *timing.notes),
     )
+
+
+def _flashes_s(plan: Plan) -> tuple[float, ...] | None:
+    """Return the full flashes that plates show; of a synced plan only the exposure counts."""
+    return None if plan.mode == "synced" else tuple(reference_duration_s(plan, light) for light in plan.lights)
 
 
 def _guess(take: Take, note: str) -> str:

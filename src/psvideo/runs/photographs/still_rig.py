@@ -82,7 +82,7 @@ def sphere_lights(
     found = calibrate_lights(sightings, radius_m=None if cut else radius_m)
     rig = found.rig
     if any(light.position_m is not None for light in rig.lights):
-        rig = replace(rig, plane=_plane_of(sightings, radius_m or 0.0))
+        rig = replace(rig, plane=plane_of(sightings, radius_m or 0.0))
     near = sum(light.position_m is not None for light in rig.lights)
     what = f"{near} near, with positions" if near else _why_directions(sightings, radius_m, cut)
     note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
@@ -96,6 +96,12 @@ def sphere_lights(
         notes=(*notes, note),
         warnings=tuple(found.warnings),
     )
+
+
+def plane_of(sightings: Sequence[Sighting], radius_m: float) -> tuple[float, float, float, float]:
+    """Return the plane across the view in which the spheres' middles lie, on the mean."""
+    away_m = [-radius_m * one.outline.view.sphere(one.outline.place)[0][2] for one in sightings]
+    return (0.0, 0.0, 1.0, float(np.mean(away_m)))
 
 
 def _through_its_lens(looking: Looking, places: Sequence[Path | Place]) -> tuple[Looking, tuple[str, ...]]:
@@ -177,13 +183,3 @@ def _files_of(place: Path | Place) -> Sequence[Path]:
 
 def _spheres(count: int) -> str:
     return "1 sphere" if count == 1 else f"{count} spheres"
-
-
-def _plane_of(sightings: Sequence[Sighting], radius_m: float) -> tuple[float, float, float, float]:
-    """Return the plane across the view in which the spheres' middles lie, on the mean."""
-    away = [
-        sighting.outline.view.focal_px * radius_m / sighting.outline.radius_px
-        for sighting in sightings
-        if sighting.outline.view.focal_px is not None
-    ]
-    return (0.0, 0.0, 1.0, float(np.mean(away)))

@@ -41,8 +41,8 @@ def intensities(
         return
     lights = found.rig.lights
     for light, error in zip(lights, found.error, strict=True):
-        voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.intensity)}  +- {error:.1%}")
+        voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.by_channel)}  +- {error:.1%}")
     voice.say(
         f"{out}: {counted(len(lights), 'light')} written; intensities are relative, their mean 1 in every channel."
     )
-    voice.result({"lights": [{"name": light.name, "intensity": light.intensity} for light in lights]})
+    voice.result({"lights": [{"name": light.name, "intensity": light.by_channel} for light in lights]})
