@@ -24,6 +24,7 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError
 from psvideo.inspect.describe import describe
+from psvideo.model.quantities import Aov
 from psvideo.model.turn import EXIF
 from psvideo.synth.camera.dpx_writer import dpx_bytes
 
@@ -363,10 +364,12 @@ def test_a_mirrored_lamp_in_a_merged_picture_makes_the_rest_neither_dark_nor_cli
 
 
 def with_exposures(folder: Path, pictures: Sequence[Picture], seconds: Sequence[float]) -> Path:
+    """Write pictures, the seventh named dark, with what EXIF says of their exposure; nothing at 0 seconds."""
     folder.mkdir()
-    for name, picture, time_s in zip(NAMES, pictures, seconds, strict=True):
+    for name, picture, time_s in zip([*NAMES, "dark"], pictures, seconds, strict=False):
         exif = Image.Exif()
-        exif.get_ifd(0x8769)[0x829A] = time_s
+        if time_s:
+            exif.get_ifd(0x8769)[0x829A] = time_s
         save8(folder / f"{name}.jpg", as_srgb(picture), exif=exif, quality=98)
     return folder
 
@@ -382,6 +385,46 @@ def test_exposures_of_exif_are_believed_where_the_pictures_agree_and_not_where_t
     lies = ps.stills(with_exposures(tmp_path / "lies", pictures, seconds), lights=lights, out=tmp_path / "other")
     assert any("EXIF was not believed" in warning for warning in lies.warnings)
     assert error_deg(tmp_path / "other") < 1.5
+
+
+@pytest.mark.parametrize(
+    "seconds",
+    [(2, 2, 2, 2, 2, 2, 1), (2, 1, 2, 2, 1, 2, 2), (1, 1, 2, 1, 1, 2, 4), (1, 1, 2, 1, 1, 1, 0)],
+    ids=["dark other", "lights differ", "both", "dark silent"],
+)
+def test_the_room_s_light_is_taken_off_as_much_as_each_picture_holds(seconds: tuple[int, ...], tmp_path: Path) -> None:
+    """A room a quarter as bright as the lights, brighter at the top: taken off as it is, normals are 4 degrees off."""
+    room = 0.1 * np.where(ball()[1], 1.5 - np.mgrid[:SIZE, :SIZE][0] / SIZE, 0.0)
+    shown = [*(light + room for light in lit()), room]
+    relative = [(time_s or 1) / 2 for time_s in seconds]
+    pictures = [np.clip(one * more / max(relative), 0, 1) for one, more in zip(shown, relative, strict=True)]
+    folder = with_exposures(tmp_path / "photos", pictures, [time_s / 100 for time_s in seconds])
+    report = ps.stills(folder, lights=listed(tmp_path / "l.lp"), out=tmp_path / "out")
+    assert "and the pictures agree" in remarks(report)
+    assert ("the ambient light was scaled by it" in remarks(report)) == (len({*seconds[:6]}) == 1)
+    assert any("does not say how it was exposed" in one for one in report.warnings) == (seconds[-1] == 0)
+    assert error_deg(tmp_path / "out") < 1.5
+
+
+def test_a_dark_picture_whose_exposure_is_misstated_is_taken_off_as_it_is(tmp_path: Path) -> None:
+    room = 0.1 * ball()[1]
+    folder = with_exposures(tmp_path / "photos", [*lit(ambient=0.1), room], [0.02] * 6 + [0.005])
+    report = ps.stills(folder, lights=listed(tmp_path / "l.lp"), out=tmp_path / "out")
+    assert any("EXIF was not believed" in warning for warning in report.warnings)
+    assert error_deg(tmp_path / "out") < 1.5
+
+
+@pytest.mark.parametrize("aov", [(), ("beauty",)])
+def test_the_room_s_light_is_judged_whatever_is_delivered(aov: tuple[Aov, ...], tmp_path: Path) -> None:
+    """The dark picture comes last, when the only round is complete."""
+    normals, inside = ball()
+    shades = [np.where(inside, 0.4 * np.maximum(normals @ light, 0) + 0.45, 0) for light in LIGHTS]
+    folder = photographs(tmp_path / "photos", shades)
+    save16(folder / "dark.png", np.where(inside, 0.45, 0))
+    report = ps.stills(folder, lights=listed(tmp_path / "l.lp"), out=tmp_path / "out", transfer="linear", aov=aov)
+    said = next(one for one in report.judgements if one.subject == "ambient")
+    assert said.grade == "bad"
+    assert "of the signal" in said.found
 
 
 def test_pictures_that_a_camera_held_upright_stand_upright(tmp_path: Path) -> None:

@@ -118,9 +118,9 @@ class Clip:
     ``colour`` is the colour interop id of plates and albedo made from this clip; ``encoding`` is how its codes are
     read; a movie has the frames' ``timestamps``. Where a movie's rate varies, numbers count ``places_per_frame`` places
     for every frame of the plan's rate, and ``plan`` has the rate of places. ``stills`` are photographs that were taken
-    one by one, at no rate. ``curve_doubt`` says why pictures were likely coded by another curve; ``warnings`` say what
-    may cost accuracy or was guessed, ``notes`` what else was
-    found on opening.
+    one by one, at no rate; ``exposures`` says how much more than usually each was exposed, () where all are alike.
+    ``curve_doubt`` says why pictures were likely coded by another curve; ``warnings`` say what may cost accuracy or was
+    guessed, ``notes`` what else was found on opening.
     """
 
     name: str
@@ -136,6 +136,7 @@ class Clip:
     timestamps: tuple[int, ...] = ()
     places_per_frame: int = 1
     stills: bool = False
+    exposures: tuple[float, ...] = ()
     curve_doubt: str = ""
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -23,7 +23,14 @@ from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient.ambient_followed import update
 from psvideo.plates.ambient.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient.ambient_regression import Separated
-from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, at_true_places, dark_plates, ripple_of
+from psvideo.plates.ambient.ambient_shown import (
+    AHEAD,
+    ambient_shown,
+    at_true_places,
+    dark_plates,
+    evenly_exposed,
+    ripple_of,
+)
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
@@ -185,6 +192,7 @@ def clip_plates(
     single = (
         split(frames, camera, here, unseen=unseen) if method == "weights" else hudon2015.split(frames, camera, here)
     )
+    single = map(partial(evenly_exposed, clip=clip), single)
     known = None if part is None else part.ambient
     if come_often:
         known_early = EARLY_DARKS if holds_plain_codes(clip) and part is None else 0

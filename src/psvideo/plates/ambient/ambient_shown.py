@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.clip import Frame, Take, holds_plain_codes, read_frames
+from psvideo.clip import Clip, Frame, Take, holds_plain_codes, read_frames
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
 from psvideo.model.rows.recipe import frames_of
@@ -42,8 +42,24 @@ def dark_plates(take: Take, timing: Timing, after: int = -1) -> Iterator[Plate]:
             frames = at_true_places(read_frames(take.clip, near, kept=take.kept, in_files=in_files), places)
             plate = plate_of(dark, frames, camera, timing) if near else None
             if plate is not None:
-                yield plate
+                yield evenly_exposed(plate, take.clip)
             del plate
+
+
+def has_one_dark_slot(take: Take, timing: Timing) -> bool:
+    """Return whether a single dark slot shows a take's ambient light: rounds that are judged by it wait for it."""
+    return sum(flash.complete and flash.is_dark for flash in used_of(take, timing).flashes) == 1
+
+
+def evenly_exposed(plate: Plate, clip: Clip) -> Plate:
+    """Return a plate that counts ambient light in usual exposures, also where each of a clip's photographs was exposed
+    in its own way: a dark one is brought to the usual exposure, and of a lit one its share is."""
+    if not clip.exposures:
+        return plate
+    times = clip.exposures[plate.flash.index]
+    if not plate.flash.is_dark:
+        return replace(plate, shares=plate.shares * times)
+    return replace(plate, picture=replace(plate.picture, coefficients=plate.picture.coefficients / times))
 
 
 def _separated_plates(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import MOST_WAITING, writing
 from psvideo.export.sequences.result_files import is_written
+from psvideo.plates.ambient.ambient_shown import has_one_dark_slot
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
 from psvideo.plates.spread import rounds_spread
@@ -111,7 +112,7 @@ def instants_of(
         job.take,
         job.timing,
         aligning=job.aligning,
-        with_ambient=job.mixes_ambient or job.delivery.plates,
+        with_ambient=job.mixes_ambient or job.delivery.plates or has_one_dark_slot(job.take, job.timing),
         start_number=job.start_number,
         part=part,
         watch=watch,

@@ -52,7 +52,8 @@ def still_clip(
     glance = glance_at(pictures, rig.lights)
     exposures, note, warning = exposures_of(glance, pictures, len(pairs.files))
     if exposures is not None:
-        rig = _scaled(rig, exposures)
+        rig = _scaled(rig, exposures[: len(rig.lights)])
+        glance = None if glance is None else glance.exposed(exposures)
     rig, lens = _through_lens(rig, pictures, looking)
     doubt = curve_doubt(glance, pictures)
     write_text(place / RIG, format_rig(rig))
@@ -75,7 +76,9 @@ def still_clip(
     clip = pictures.clip(folder, plan, place / PLAN_FILE, notes=notes)
     doubts = (warning, dark_doubt(glance, pictures, pairs.aside))
     warned = (*clip.warnings, *known.warnings, *(one for one in doubts if one))
-    return StillClip(clip=replace(clip, curve_doubt=doubt or "", warnings=warned), rig=rig, rig_path=place / RIG)
+    uneven = () if exposures is None or not pairs.dark else tuple(exposures.tolist())
+    clip = replace(clip, curve_doubt=doubt or "", warnings=warned, exposures=uneven)
+    return StillClip(clip=clip, rig=rig, rig_path=place / RIG)
 
 
 def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None:

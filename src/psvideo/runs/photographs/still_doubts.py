@@ -4,7 +4,7 @@ A matte surface under known lights leaves small residuals; a wrong assumption ma
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -52,16 +52,23 @@ and brighter than black: this share of a typical signal."""
 @dataclass(frozen=True, kw_only=True)
 class Glance:
     """Signals of a few pixels, (light, pixel), 0 to 1 as the files code them, and the distant lights' vectors; ``dark``
-    (pixel,) are those of the ambient light alone."""
+    (pixel,) are those of the ambient light alone, of which each picture holds ``dark_times`` as much, (light,)."""
 
     signals: FloatArray
     directions: FloatArray
     strengths: FloatArray
     dark: FloatArray | None = None
+    dark_times: FloatArray | None = None
 
-    def left_over(self, transfer: str, exposures: FloatArray | None = None) -> float:
+    def exposed(self, relative: FloatArray) -> "Glance":
+        """Return the same, taken to be exposed so: (picture,), the dark one last."""
+        count = len(self.strengths)
+        times = None if self.dark is None else relative[:count] / relative[count]
+        return replace(self, strengths=self.strengths * relative[:count], dark_times=times)
+
+    def left_over(self, transfer: str) -> float:
         """Return the share of a typical pixel's light that no matte surface explains."""
-        lit = self._lit(transfer, exposures)
+        lit = self._lit(transfer)
         brightest, used = lit.max(axis=0), self._used(lit)
         enough = _enough(used, brightest)
         lit, used = lit[:, enough], used[:, enough]
@@ -87,13 +94,14 @@ class Glance:
             shares.append(float(np.median(np.linalg.norm(residual, axis=0) / np.maximum(sizes, 1e-12))))
         return shares[0], shares[1]
 
-    def _lit(self, transfer: str, exposures: FloatArray | None = None) -> FloatArray:
+    def _lit(self, transfer: str) -> FloatArray:
         """Return what the lights gave, (light, pixel), each as if it were of strength 1."""
         curve = find_curve(transfer)
         light = to_light(curve, self.signals)
-        light = light if self.dark is None else np.maximum(light - to_light(curve, self.dark), 0)
-        strength = self.strengths if exposures is None else self.strengths * exposures
-        return np.asarray(light / strength[:, None], np.float64)
+        if self.dark is not None:
+            times = np.ones(len(light)) if self.dark_times is None else self.dark_times
+            light = np.maximum(light - times[:, None] * to_light(curve, self.dark), 0)
+        return np.asarray(light / self.strengths[:, None], np.float64)
 
     def _used(self, lit: FloatArray) -> NDArray[np.bool_]:
         return np.asarray((lit > LEAST * lit.max(axis=0)) & (self.signals < MOST))
@@ -174,27 +182,40 @@ def curve_doubt(glance: Glance | None, pictures: Photographs) -> str | None:
 def exposures_of(
     glance: Glance | None, pictures: Photographs, count: int
 ) -> tuple[FloatArray | None, str | None, str | None]:
-    """Return by how much more each light's picture was exposed than the usual one, None where all are alike or their
-    files cannot be believed; with what to note, and what to warn of."""
-    named = [one.exposure for one in pictures.stated[:count]]
-    known = np.array([one for one in named if one is not None])
+    """Return by how much more each picture, the dark one last, was exposed than the usual one of ``count`` lights; None
+    where all are alike or their files cannot be believed. With what to note, and what to warn of."""
+    named = [one.exposure for one in pictures.stated]
+    known = np.array([one for one in named[:count] if one is not None])
     if len(known) < count:
         some = len(known) and f"Only {len(known)} of {count} pictures say how they were exposed; none is scaled."
         return None, some or None, None
-    relative = known / np.median(known)
-    if relative.max() < OTHER_EXPOSURE * relative.min():
+    lights = known / np.median(known)
+    relative = np.append(lights, [(one or np.median(known)) / np.median(known) for one in named[count:]])
+    if not _differ(relative):
         return None, None, None
     odd = pictures.files[int(np.argmax(np.abs(np.log(relative))))].name
     times = float(np.exp(np.abs(np.log(relative)).max()))
     said = f"By their EXIF the pictures were exposed differently ({odd} by a factor {times:.2g} from the usual)"
-    if glance is None:
-        return relative, f"{said}; their lights' strengths were scaled by it.", None
-    scaled, plain = glance.left_over(pictures.transfer, relative), glance.left_over(pictures.transfer)
-    if scaled < plain:
-        return relative, f"{said}, and the pictures agree: their lights' strengths were scaled by it.", None
+    scaled = "their lights' strengths were" if _differ(lights) else "the ambient light was"
+    silent = None
+    if None in named:
+        silent = (
+            f"{pictures.files[count].name} does not say how it was exposed, and the other pictures differ. Its light "
+            "is taken off as of one exposed as most are. Give it as the camera wrote it."
+        )
+    plain = float("nan") if glance is None else glance.left_over(pictures.transfer)
+    if glance is None or np.isnan(plain):
+        return relative, f"{said}; {scaled} scaled by it.", silent
+    left = glance.exposed(relative).left_over(pictures.transfer)
+    if left < (plain if _differ(lights) else plain / CLEARLY):  # a dim room says little of the dark picture alone
+        return relative, f"{said}, and the pictures agree: {scaled} scaled by it.", silent
     return (
         None,
         None,
-        f"{said}, but the pictures do not show it: scaled by it, {100 * scaled:.1f} % of the light is left over, and "
+        f"{said}, but the pictures do not show it: scaled by it, {100 * left:.1f} % of the light is left over, and "
         f"{100 * plain:.1f} % as they are. EXIF was not believed; check whether the files were developed or edited.",
     )
+
+
+def _differ(exposures: FloatArray) -> bool:
+    return bool(exposures.max() >= OTHER_EXPOSURE * exposures.min())
