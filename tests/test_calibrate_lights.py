@@ -192,11 +192,11 @@ def test_a_white_target_shows_intensities_and_leaves_only_falloff_that_the_rig_d
     assert min(light.falloff for light in measure_flat_field(vignetted, rig, target, ground=ground)) > 0.05
 
 
-CARD = Target(albedo=0.9, normal=np.array([0.0, 0.0, 1.0]), rows=slice(0, 24), cols=slice(0, 32))
+FACING = Target(albedo=0.9, normal=np.array([0.0, 0.0, 1.0]), rows=slice(0, 24), cols=slice(0, 32))
 WAYS = ((0.6, 0.0, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.6, 0.8))
 
 
-def card(seen: Array) -> LightPictures:
+def under(seen: Array) -> LightPictures:
     """A white card that faces the camera under lights whose strengths the channels see so, (light, channel)."""
     images = [np.full((24, 32, 3), 0.9 * way[2] * one, np.float32) for way, one in zip(WAYS, seen, strict=True)]
     return light_pictures("abc", images)
@@ -208,8 +208,8 @@ def test_what_is_measured_takes_the_place_of_colour_and_of_the_flash_that_the_ol
         Light(name=name, direction=way, intensity=(2.0,), colour=tuple(one), reference_duration_s=0.0016)
         for name, way, one in zip("abc", WAYS, seen, strict=True)
     )
-    rig, pictures = Rig(lights=lights), card(seen)
-    strengths = [light.intensity.tolist() for light in measure_flat_field(pictures, rig, CARD)]
+    rig, pictures = Rig(lights=lights), under(seen)
+    strengths = [light.intensity.tolist() for light in measure_flat_field(pictures, rig, FACING)]
     for flashes_s in (None, (0.0008, 0.0008, 0.0004)):
         measured = with_intensities(rig, strengths, replace(pictures, flashes_s=flashes_s)).lights
         np.testing.assert_allclose([light.by_channel for light in measured], seen, rtol=1e-4)
@@ -235,7 +235,7 @@ def test_a_clip_says_for_how_long_the_lights_shone_whose_strengths_it_shows(tmp_
 def test_a_plane_is_the_same_with_either_sign(sign: float) -> None:
     rig = Rig(lights=(), plane=(0.2 * sign, 0.0, sign, 1.2 * sign))
     lights = tuple(Light(name=name, direction=way) for name, way in zip("abc", WAYS, strict=True))
-    known, pictures = replace(rig, lights=lights), card(np.ones((3, 3)))
+    known, pictures = replace(rig, lights=lights), under(np.ones((3, 3)))
     target, _ = white_target(pictures, known, Path("rig.toml"), albedo=0.9, box=None)
     np.testing.assert_allclose(target.normal, np.array([0.2, 0, 1]) / np.hypot(0.2, 1))
 
@@ -245,10 +245,10 @@ def test_a_light_that_only_grazes_the_target_is_refused_and_one_above_it_is_meas
     rig = Rig(lights=(Light(name="a", direction=(float(np.sqrt(1 - cosine**2)), 0.0, cosine)),))
     pictures = light_pictures("a", [np.full((24, 32), 0.9 * cosine, np.float32)])
     if cosine > 0.05:
-        assert measure_flat_field(pictures, rig, CARD)[0].intensity == pytest.approx(1)
+        assert measure_flat_field(pictures, rig, FACING)[0].intensity == pytest.approx(1)
         return
     with pytest.raises(PsvideoError, match="behind the white target, or just at its edge"):
-        measure_flat_field(pictures, rig, CARD)
+        measure_flat_field(pictures, rig, FACING)
 
 
 def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> None:
