@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from psvideo.cli.app import main
+from psvideo.clip.folder import KINDS
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.light_lists.light_list_reader import pictures_named_by
 from psvideo.formats.light_lists.light_list_writer import write_rig
+from psvideo.formats.light_lists.picture_names import PICTURE_ENDINGS
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Light, Rig, Vector
 
@@ -132,6 +134,86 @@ def test_lines_that_may_mean_anything_are_refused(tmp_path: Path, text: str, sai
     (tmp_path / "lights.txt").write_text(text)
     with pytest.raises(PsvideoError, match=said):
         read_rig(tmp_path / "lights.txt")
+
+
+UNITS = ((0.6, 0, 0.8), (0, 0.6, 0.8), (-0.6, 0, 0.8), (0, -0.6, 0.8))
+
+
+@pytest.mark.parametrize("count", ["", "4\n"], ids=["plain", "counted"])
+@pytest.mark.parametrize("before", ["", "{n} ", "lamp{n} ", "shot {n} "], ids=["bare", "numbered", "named", "counts"])
+@pytest.mark.parametrize(
+    "strengths",
+    [((1.0,), (0.5,), (0.25,), (2.0,)), ((1, 0.5, 2), (2, 1, 4), (0.5, 1, 1), (1, 1, 3))],
+    ids=["one", "three"],
+)
+@pytest.mark.parametrize("kind", ["a.lp", "a.txt"])
+def test_strengths_behind_directions_are_the_lights_counted_or_not(
+    count: str, before: str, strengths: tuple[tuple[float, ...], ...], kind: str, tmp_path: Path
+) -> None:
+    if kind == "a.lp" and not count:
+        return
+    lines = [
+        before.format(n=n) + " ".join(map(str, (*at, *how)))
+        for n, (at, how) in enumerate(zip(UNITS, strengths, strict=True))
+    ]
+    (tmp_path / kind).write_text(count + "\n".join(lines))
+    back = read_rig(tmp_path / kind)
+    assert [light.direction for light in back.lights] == list(UNITS)
+    assert [light.intensity for light in back.lights] == list(strengths)
+    assert "lamp" not in before or back.names == ("lamp0", "lamp1", "lamp2", "lamp3")
+
+
+@pytest.mark.parametrize("last", [(0, 0, 0, 0), (1, 2, 3, 4)], ids=["of graphics", "its own number"])
+def test_a_fourth_number_that_is_no_strength_is_passed_over(last: tuple[int, ...], tmp_path: Path) -> None:
+    at = ((0.6, 0.0, 0.8), (0.0, 0.6, 0.8), (0.8, 0.0, 0.6), (0.48, 0.6, 0.64))
+    lines = (f"{x} {y} {z} {n}\n" for (x, y, z), n in zip(at, last, strict=True))
+    (tmp_path / "a.txt").write_text("".join(lines))
+    lights = read_rig(tmp_path / "a.txt").lights
+    assert [light.direction for light in lights] == list(at)
+    assert {light.intensity for light in lights} == {(1.0,)}
+
+
+def test_a_counted_list_may_hold_positions_behind_names_that_end_in_numbers(tmp_path: Path) -> None:
+    (tmp_path / "a.lp").write_text("3\nshot 1 0 0 200\nshot 2 60 0 80\nshot 3 0 30 40\n")
+    assert [light.direction for light in read_rig(tmp_path / "a.lp").lights] == [
+        (0, 0, 1),
+        (0.6, 0, 0.8),
+        (0, 0.6, 0.8),
+    ]
+    (tmp_path / "a.lp").write_text("2\na 0.5 10.5 200 1\nb 60 10 80 1\n")
+    with pytest.raises(PsvideoError, match="a line has 4 numbers"):
+        read_rig(tmp_path / "a.lp")
+
+
+@pytest.mark.parametrize("count", ["", "2\n"], ids=["plain", "counted"])
+def test_six_numbers_whose_first_three_are_no_direction_are_refused(count: str, tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text(f"{count}10 20 30 1 0.5 1\n20 0 30 1 1 1\n")
+    with pytest.raises(PsvideoError, match="a line has 6 numbers"):
+        read_rig(tmp_path / "a.txt")
+
+
+def test_a_light_that_does_not_shine_is_refused_with_its_file_and_name(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("key 0 0 1 1 1 1\nleft 0.6 0 0.8 1 0 1\n")
+    with pytest.raises(PsvideoError, match=r"a\.txt: light 2 \('left'\) has the strength 1 0 1"):
+        read_rig(tmp_path / "a.txt")
+    (tmp_path / "light_directions.txt").write_text("0 0 1\n0.6 0 0.8\n")
+    (tmp_path / "light_intensities.txt").write_text("-2 1 1\n1 1 1\n")
+    with pytest.raises(PsvideoError, match=r"light_intensities\.txt: light 1 \('L0'\) has the strength -2 1 1"):
+        read_rig(tmp_path / "light_directions.txt")
+
+
+def test_only_endings_of_pictures_are_taken_off_the_names_of_lights(tmp_path: Path) -> None:
+    (tmp_path / "a.lp").write_text("3\nkey.left 0 0 1\nkey.top 0.6 0 0.8\nback.JPG 0 0.6 0.8\n")
+    assert read_rig(tmp_path / "a.lp").names == ("key.left", "key.top", "back")
+    assert set(KINDS) <= set(PICTURE_ENDINGS), "what psvideo reads is a picture"
+
+
+def test_commas_in_comments_are_no_decimal_commas(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("# lamps 3,5 m away\n0 0 1  # at 2,5 m\n0.6 0 0.8\n0 0.6 0.8\n")
+    assert len(read_rig(tmp_path / "a.txt").lights) == 3
+    (tmp_path / "a.txt").write_text("# lamps 3.5 m away\n0 0 1\n0,6 0 0,8\n0 0.6 0.8\n")
+    with pytest.raises(PsvideoError, match="writes '0,6'"):
+        read_rig(tmp_path / "a.txt")
 
 
 def test_a_near_light_is_in_no_list_and_a_name_that_shows_no_kind_is_refused(tmp_path: Path) -> None:

@@ -13,14 +13,13 @@ from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
+from psvideo.formats.light_lists.picture_names import without_ending
 from psvideo.formats.paths import check_file
 from psvideo.model.units import listed
 
 FEWEST = 3
 LISTED = 6
 """This many names are listed in a message."""
-ENDINGS = {*KINDS, ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".dng", ".heic", ".webp", ".bmp"}
-"""What may end a picture's name in a list, also where the picture itself has been exported as another kind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,9 +170,7 @@ def _left_over(known: Sequence[str], places: Sequence[int], whose: str) -> str:
 
 def _stem_of(name: str) -> str:
     """Return a name of a list, a path perhaps, as the stem that its picture should have."""
-    word = re.split(r"[\\/]", name.strip())[-1]
-    ending = "." + word.rpartition(".")[2].lower()
-    return word[: -len(ending)] if ending in ENDINGS and word[: -len(ending)] else word
+    return without_ending(re.split(r"[\\/]", name.strip())[-1])
 
 
 def _alike(stem: str) -> str:

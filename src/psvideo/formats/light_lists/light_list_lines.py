@@ -15,8 +15,8 @@ import numpy as np
 from psvideo.errors import PsvideoError
 from psvideo.model.units import counted
 
-DIRECTION, WITH_STRENGTHS = 3, 6
-"""Numbers of a line: x y z, or these and red, green and blue strengths."""
+DIRECTION, WITH_ONE, WITH_STRENGTHS = 3, 4, 6
+"""Numbers of a line: x y z, these and one strength, or these and red, green and blue strengths."""
 UNIT = 0.02
 """A direction's length is off by no more than this from 1: two digits after the point make 0.01."""
 COMMENT, REMARK = re.compile(r"\s*(#|//|%)"), re.compile(r"\s(#|//)")
@@ -51,37 +51,65 @@ def lines_in(text: str) -> list[ListLine]:
     >>> lines_in("# two lights\\nvase 1.jpg  0 0 1\\n0.6, 0, 0.8, 'b'")[0]
     ListLine(name='vase 1.jpg', words=('0', '0', '1'))
     """
-    lines = [_line(_without_remark(raw)) for raw in text.splitlines() if not COMMENT.match(raw)]
-    return [line for line in lines if line.words]
+    return [line for line in map(_line, without_comments(text)) if line.words]
 
 
-def directed(path: Path, lines: Sequence[ListLine]) -> list[ListLine]:
-    """Return lines that hold nothing but a direction, or one and three strengths.
+def without_comments(text: str) -> list[str]:
+    """Return the lines of a list that are no comment, without the remarks behind their numbers."""
+    return [_without_remark(raw) for raw in text.splitlines() if not COMMENT.match(raw)]
 
-    Raises PsvideoError where lines hold other numbers as well, and it cannot be told which are meant.
+
+def directed(path: Path, lines: Sequence[ListLine], *, by_count: bool = False) -> list[ListLine]:
+    """Return lines that hold nothing but a direction, or one and its strengths: one number or three.
+
+    ``by_count`` are the lines of a list that says how many it has: they are lights, never columns, and where nothing in
+    them is of unit length, the last three numbers behind a name that ends in whole numbers are a position. Raises
+    PsvideoError where lines hold other numbers as well, and it cannot be told which are meant.
     """
-    lines = _in_columns(lines) or lines
+    lines = lines if by_count else _in_columns(lines) or lines
     widths = {len(line.words) for line in lines}
-    if widths <= {DIRECTION, WITH_STRENGTHS} or min(widths) < DIRECTION:
+    if widths == {DIRECTION} or min(widths) < DIRECTION or _have_strengths(lines):
         return _without_places(lines)
-    ends = [_lines_from(lines, place) for place in range(max(widths) - DIRECTION + 1)] if len(widths) == 1 else []
-    if not ends and all(line.name for line in lines):
-        ends = [[line.from_place(len(line.words) - DIRECTION) for line in lines]]
-    right = [one for one in ends if _are_units(one)]
+    rests = range(DIRECTION, min(widths) + 1) if len(widths) == 1 or all(line.name for line in lines) else ()
+    right = [one for one in (_lines_from(lines, rest) for rest in rests) if _are_units(one)]
+    if by_count and not right and WITH_STRENGTHS not in widths:
+        right = _positions(lines)
     if len(right) != 1:
-        odd = next(line for line in lines if len(line.words) not in (DIRECTION, WITH_STRENGTHS))
+        odd = next((line for line in lines if len(line.words) not in (DIRECTION, WITH_STRENGTHS)), None)
+        words = (odd or max(lines, key=lambda line: len(line.words))).words
         raise PsvideoError(
-            f"{path}: a line has {counted(len(odd.words), 'number')} ({' '.join(odd.words[:8])}). Expected three in "
-            "every line, x y z of the direction to the light, or six: these and the light's strength in red, green and "
-            "blue."
+            f"{path}: a line has {counted(len(words), 'number')} ({' '.join(words[:8])}). Expected three in every "
+            "line, x y z of the direction to the light, or these, of length 1, and the light's strength behind them: "
+            "one number, or red, green and blue."
         )
     return _without_places(right[0])
 
 
-def _lines_from(lines: Sequence[ListLine], place: int) -> list[ListLine]:
-    """Return lines with the direction that begins at a place, and with the three strengths where these follow."""
-    count = WITH_STRENGTHS if len(lines[0].words) - place == WITH_STRENGTHS else DIRECTION
-    return [line.from_place(place, count) for line in lines]
+def _have_strengths(lines: Sequence[ListLine]) -> bool:
+    """Return whether every line is a direction, or one of unit length and three strengths."""
+    long = [line for line in lines if len(line.words) != DIRECTION]
+    return all(len(line.words) == WITH_STRENGTHS for line in long) and _are_units(long)
+
+
+def _lines_from(lines: Sequence[ListLine], rest: int) -> list[ListLine]:
+    """Return lines with the direction that begins ``rest`` numbers before the end, and with the strengths behind it."""
+    lines = [line.from_place(len(line.words) - rest) for line in lines]
+    if rest == WITH_STRENGTHS or (rest == WITH_ONE and _are_strengths([line.numbers[DIRECTION] for line in lines])):
+        return lines
+    return [line.from_place(0, DIRECTION) for line in lines]
+
+
+def _are_strengths(last: Sequence[float]) -> bool:
+    """Return whether a fourth number is a strength: neither the line's own number, nor 0 in every line, as computer
+    graphics write behind directions."""
+    return any(last) and not (len(last) > 1 and set(np.diff(last)) == {1})
+
+
+def _positions(lines: Sequence[ListLine]) -> list[list[ListLine]]:
+    """Return lines with their last three numbers, of any length; nothing where one before may be more than a name's."""
+    if not all(word.isdigit() for line in lines for word in line.words[:-DIRECTION]):
+        return []
+    return [[line.from_place(len(line.words) - DIRECTION) for line in lines]]
 
 
 def is_number(word: str) -> bool:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name, read_text
-from psvideo.formats.light_lists.light_list_lines import DIRECTION, ListLine, directed, lines_in
+from psvideo.formats.light_lists.light_list_lines import DIRECTION, ListLine, directed, lines_in, without_comments
+from psvideo.formats.light_lists.picture_names import without_ending
 from psvideo.model.rig import Light, Rig
 from psvideo.model.units import counted
 
@@ -24,8 +25,6 @@ DIRECTIONS, INTENSITIES, FILENAMES = "light_directions.txt", "light_intensities.
 ANGLES_SPAN = 7.0
 """Columns that span more, beside a third one that is the same throughout, are degrees: more than radians do."""
 AXES = "x right, y up, z towards the camera"
-ENDING = re.compile(r"\.[A-Za-z][A-Za-z0-9]{1,3}$")
-"""Of a picture's name: from .jpg to .tiff and .cr3."""
 DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 
 
@@ -51,8 +50,9 @@ def read_light_list(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
         )
     _refuse_angles(path, vectors)
     beside = _diligent_strengths(path, len(rows))
-    strengths = [tuple(row[3:6]) if len(row) == 6 else strength for row, strength in zip(rows, beside, strict=True)]
+    strengths = [row[DIRECTION:] or strength for row, strength in zip(rows, beside, strict=True)]
     names = _names(path, len(rows), plan_lights)
+    _refuse_dark(path, names, strengths)
     lights = [
         Light(name=name, direction=(x, y, z), intensity=strength)
         for name, (x, y, z), strength in zip(names, (vectors / lengths[:, None]).tolist(), strengths, strict=True)
@@ -81,7 +81,8 @@ def _lights(path: Path) -> list[ListLine]:
 
 def _lines(path: Path, text: str) -> list[ListLine]:
     """Return the lines that hold numbers. Raises PsvideoError where none does, or where they have decimal commas."""
-    comma = next((word for word in re.split(r"[\s;]+", text) if DECIMAL_COMMA.fullmatch(word)), None)
+    words = re.split(r"[\s;]+", "\n".join(without_comments(text)))
+    comma = next((word for word in words if DECIMAL_COMMA.fullmatch(word)), None)
     if comma:
         raise PsvideoError(
             f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
@@ -112,7 +113,7 @@ def _counted(path: Path, lines: Sequence[ListLine]) -> list[ListLine]:
             f"{path}: a line has {counted(len(short), 'number')} ({' '.join(short)}); expected three numbers x y z of "
             f"a direction in every line after the first ({AXES}). Angles are to be made directions first."
         )
-    return [line.from_place(len(line.words) - DIRECTION) for line in after]
+    return directed(path, after, by_count=True)
 
 
 def _refuse_angles(path: Path, vectors: NDArray[np.float64]) -> None:
@@ -141,6 +142,18 @@ def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
     return list(rows)
 
 
+def _refuse_dark(path: Path, names: Sequence[str], strengths: Sequence[tuple[float, ...]]) -> None:
+    """Raise PsvideoError where a light gives no light: the list, or the one of intensities beside it, says so."""
+    dark = next((place for place, strength in enumerate(strengths) if min(strength) <= 0), None)
+    if dark is not None:
+        beside = path.with_name(INTENSITIES)
+        shown = " ".join(f"{one:g}" for one in strengths[dark])
+        raise PsvideoError(
+            f"{beside if path.name == DIRECTIONS and beside.is_file() else path}: light {dark + 1} ({names[dark]!r}) "
+            f"has the strength {shown}; expected strengths above 0. Take a light that does not shine off the list."
+        )
+
+
 def _names(path: Path, count: int, plan_lights: Sequence[str]) -> list[str]:
     written = _written_names(path, count)
     if set(written) & set(plan_lights):
@@ -161,7 +174,7 @@ def _written_names(path: Path, count: int) -> list[str]:
     names none, or two lights alike."""
     words = [re.split(r"[\\/]", name)[-1] for name in pictures_named_by(path)]
     try:
-        names = [check_light_name(ENDING.sub("", word) or word) for word in words]
+        names = [check_light_name(without_ending(word)) for word in words]
     except ValueError:
         return []
     return names if len(set(names)) == count == len(names) else []
