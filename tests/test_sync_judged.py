@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from psvideo.errors import PsvideoError
+from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
@@ -199,6 +199,24 @@ def test_lights_that_all_flash_at_once_are_recognised(plan: Plan) -> None:
 def test_gain_that_jumps_from_frame_to_frame_is_said(plan: Plan) -> None:
     gain = np.exp(0.15 * np.random.default_rng(2).standard_normal(FRAMES))
     assert any("gain by itself" in note for note in timing_of(plan, filmed(plan, gain=gain)).notes)
+
+
+@pytest.mark.parametrize("room", [0.05, 0.1])
+def test_light_of_the_room_that_grows_is_no_gain_of_the_camera(plan: Plan, room: float) -> None:
+    profiles = filmed(plan) + room * (1 + 0.6 * np.linspace(0, 1, FRAMES))[:, None]
+    assert not any("gain by itself" in note for note in timing_of(plan, profiles).notes)
+
+
+@pytest.mark.parametrize("ppm", [0.0, 30.0])
+def test_pictures_that_any_flash_times_explain_are_refused(plan: Plan, ppm: float) -> None:
+    """A flash a frame: rows see four pictures, of three lights and the room."""
+    period_s = plan.camera.frame_period_s
+    plan = replace(with_camera(plan, exposure_s=0.9 * period_s), dark_s=period_s - plan.shortest_flash_s)
+    profiles = filmed(plan, frames=60, ppm=ppm) + 0.05
+    with pytest.raises(NoStrobeError, match="keeps step with the camera: the same 4 pictures"):
+        timing_of(plan, profiles)
+    other = replace(plan, dark_s=plan.dark_s + 0.1 * period_s)
+    assert timing_of(other, filmed(other, frames=60, ppm=ppm)).phase_error_rows < 0.1, "as advised"
 
 
 def locked(plan: Plan, shutter: float) -> Plan:

@@ -35,7 +35,7 @@ from psvideo.sync.unbroken import unbroken
 from psvideo.sync.unfired import incomplete, only_fired, remarks_on_unfired, unfired_of
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
-from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
+from psvideo.sync.verdict.refusal import clock_too_far, in_step_with_frames, nothing_to_find, shows_the_same, why_not
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
 
 ADVICE = (
@@ -227,6 +227,8 @@ def _strobe(plan: Plan, found: ClipFit, first_light: str | None) -> FoundStrobe:
 
 
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
+    if shows_the_same(plan, found.rows, found.fit.beat):
+        return f"{clip}: {in_step_with_frames(plan)}"
     reason = why_not(plan, rows) or clock_too_far(plan, found)
     explained = f"explains {100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
     if found.steps:

@@ -9,7 +9,7 @@ from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.rowfit.standard_error import freedom
 from psvideo.sync.rowfit.tracking.course import too_many
-from psvideo.sync.verdict.refusal import MOST_PPM
+from psvideo.sync.verdict.refusal import MOST_PPM, shows_the_same
 from psvideo.sync.verdict.rivals import (
     BETTER,
     CLEARLY,
@@ -101,7 +101,8 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
     strobed = explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance)) and share > max(MIN_GAIN, by_chance)
     told = fit.beat.row_time_s > 0.0 and min(share, explained) > 0.9
     return (
-        (strobed or found.across > ACROSS)
+        not shows_the_same(plan, rows, fit.beat)
+        and (strobed or found.across > ACROSS)
         and (not often or told)
         and (_excuses(plan, found) < EXCUSES or share > UNSURE_GAIN)
         and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM

@@ -6,12 +6,15 @@ import numpy as np
 
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.model.units import counted, show_seconds
+from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.search import GridPlace, search
 from psvideo.sync.rowfit.coarse.seed import SEARCH_ROWS, first_guess, gain_of
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.verdict.rivals import CLEARLY, Rival, best_rival, count_rivals, likely_rates, strobe_rivals
 
+ALIKE = 0.2
+"""Frames that see the cycle at times which differ by less than this share of the shortest flash are alike."""
 STEADY = 0.02
 """Rows that change by less than this share of their light from frame to frame saw no strobe."""
 ALONE = 0.15
@@ -61,6 +64,33 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
             "lights flashed and are bright enough; open the lens or raise the gain."
         )
     return ""
+
+
+def shows_the_same(plan: Plan, rows: Profiles, beat: Beat) -> bool:
+    """Return whether a rolling shutter sees no more different frames, again and again, than a row has brightnesses:
+    ambient light and lights then explain them wherever the flashes fell.
+
+    Frames are alike that see the cycle at the same time, or nearly. A global shutter sees plates whole all the same.
+    """
+    if beat.row_time_s == 0.0:
+        return False
+    cycle_s, alike_s = plan.cycle_s * beat.clock.rate, ALIKE * plan.shortest_flash_s
+    at_s = np.sort(rows.frame_start_s % cycle_s)
+    gaps_s = np.diff(np.append(at_s, at_s[0] + cycle_s))
+    apart = gaps_s > alike_s
+    kinds = max(int(apart.sum()), 1)
+    return kinds <= len(plan.lit_slots) + 1 and cycle_s - gaps_s[apart].sum() < kinds * alike_s
+
+
+def in_step_with_frames(plan: Plan) -> str:
+    """Say that frames repeat so soon that any time would explain them, and what to do."""
+    frames = round(plan.cycle_s / plan.camera.frame_period_s)
+    return (
+        f"the strobe keeps step with the camera: the same {counted(frames, 'picture')} come again and again, and a row "
+        f"has as many brightnesses ({counted(len(plan.lit_slots), 'light')} and what else shines), so that any flash "
+        "times would explain them. Film for so long that the clocks drift apart by a flash, or plan another dark time "
+        f"(dark_s = {plan.dark_s + 0.1 * plan.camera.frame_period_s:.4g} under [strobe])."
+    )
 
 
 def least_frames(plan: Plan) -> int:

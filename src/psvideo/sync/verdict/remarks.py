@@ -30,6 +30,9 @@ GAIN_FRAMES = (9, 1)
 """Frames over which a gain is taken to be the same: exposures creep, and some jump."""
 DIM = 0.05
 """Frames with less than this share of the usual light show no gain."""
+TIED, TINY = 1e-3, 1e-30
+"""The gains of flashes and of the room are alike by this much where frames do not tell them apart; and what keeps the
+gains of black frames finite."""
 MIXED_ROWS = 0.02
 """Share of the rows that may hold two flashes before it is worth a word."""
 UNFIRED = 0.01
@@ -172,21 +175,30 @@ def _exposure(plan: Plan, found: ClipFit) -> str:
 
 
 def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[FloatArray, float]:
-    """Return every frame's gain (frame,) against the whole clip's brightnesses, and what gains explain of the rest."""
+    """Return every frame's gain (frame,) of its flashes, against the whole clip's brightnesses, and what gains explain
+    of the rest. The light of the room has a gain of its own: it changes where a camera does not."""
     rows = replace(found.rows, doubt=None)
     beat = replace(found.fit.beat, beat_hz=())
-    expected = predictions(plan, rows, beat, brightnesses(plan, rows.one_window(), beat))
+    light = brightnesses(plan, rows.one_window(), beat)
+    expected = predictions(plan, rows, beat, light)
     trust = found.fit.weight / found.fit.weight.max(axis=0)
-    width = min(frames_each, len(rows.value))
-    around = [
-        np.convolve(np.pad(sums, width // 2, mode="edge"), np.ones(width), mode="valid")[: len(sums)]
-        for sums in ((trust * expected * rows.value).sum(axis=1), (trust * expected**2).sum(axis=1))
-    ]
-    lit = around[1] > DIM * np.median(around[1])
-    smooth: FloatArray = np.where(lit, around[0] / np.maximum(around[1], 1e-30), 1.0)
+    room = np.broadcast_to(light[:, 0], expected.shape)
+    parts = (expected - room, room)
+
+    def around(picture: FloatArray) -> FloatArray:
+        sums, width = (trust * picture).sum(axis=1), min(frames_each, len(rows.value))
+        padded = np.pad(sums, width // 2, mode="edge")
+        return np.convolve(padded, np.ones(width), mode="valid")[: len(sums)]
+
+    hessian = np.array([[around(one * other) for one in parts] for other in parts])
+    change = np.array([around(one * (rows.value - expected)) for one in parts])
+    hessian += TIED * hessian.trace() * np.array([[1.0, -1.0], [-1.0, 1.0]])[..., None]
+    more = np.linalg.solve(np.moveaxis(hessian, -1, 0) + TINY * np.eye(2), change.T[..., None])[..., 0]
+    lit = hessian[0, 0] > DIM * np.median(hessian[0, 0])
+    more[~lit] = 0.0
     before = float((trust * (rows.value - expected) ** 2).sum())
-    after = float((trust * (rows.value - smooth[:, None] * expected) ** 2).sum())
-    return smooth, 1 - after / max(before, 1e-30)
+    left = rows.value - expected - sum(one * part for one, part in zip(more.T[..., None], parts, strict=True))
+    return 1 + more[:, 0], 1 - float((trust * left**2).sum()) / max(before, 1e-30)
 
 
 def _soft(found: ClipFit) -> str:
