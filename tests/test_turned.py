@@ -33,13 +33,15 @@ from psvideo.plates.align.open_shutter import with_open_shutter
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch, changed, comparable, noise_between, sketch_of
 from psvideo.plates.align.velocity.followed import Followed, Pair
+from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
-from psvideo.plates.upright import upright
+from psvideo.plates.upright import upright, upright_window
 from psvideo.report.observe.facts import instant_facts
 from psvideo.report.observe.motion import glimpse, motion_between
+from psvideo.report.observe.observed import Observed
 
 ONE = 65536
 MATRICES = {
@@ -276,6 +278,19 @@ def test_of_a_turned_plate_as_many_rows_are_missing(turn: Turn) -> None:
     one = plate(turn, slice(0, 32))
     assert instant_facts(Round(number=1001, plates=(one,)), None, None).unseen_share == pytest.approx(1 / 3)
     assert np.array_equal(np.broadcast_to(one.own, one.shape), turn.upright(below(32)))
+
+
+@TURNS
+def test_what_frames_show_of_the_room_is_looked_at_as_it_is_seen(turn: Turn) -> None:
+    room = np.random.default_rng(2).random((ROWS, COLS)).astype(np.float32)
+    found = Separated(begins=0, image=room, stood=np.ones((8, 12), np.bool_), known=np.arange(ROWS) >= 32)
+    shown = upright_window(found, turn)
+    assert np.array_equal(shown.image, turn.upright(room))
+    known = shown.known if shown.known.ndim == 2 else shown.known[:, None]
+    assert np.array_equal(np.broadcast_to(known, shown.image.shape), turn.upright(below(32)))
+    observed = Observed(lights=("a",))
+    observed.look_at_window(shown)
+    assert observed.ambient_measured == {0: 1.0}
 
 
 @TURNS

@@ -38,7 +38,7 @@ from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
 from psvideo.plates.several_lights.unmixed import slot_names, slot_plates, unmixed
 from psvideo.plates.split import Plate, split
-from psvideo.plates.upright import upright
+from psvideo.plates.upright import upright, upright_window
 from psvideo.plates.used_flashes import used_of
 
 AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
@@ -118,8 +118,10 @@ def gather(
     if take.unmixing is None:
         check_separable(plan)
     borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
-    made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=each_window, unseen=borrows)
-    single, turn = _shown(made, each_flash), take.clip.turn
+    turn = take.clip.turn
+    window = None if each_window is None else lambda found: each_window(upright_window(found, turn))
+    made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=window, unseen=borrows)
+    single = _shown(made, each_flash)
     names, plates = plan.lights, light_plates(single, plan, flashes, start=start_number)
     if take.unmixing is not None:
         names, plates = slot_names(plan), slot_plates(single, flashes, start=start_number)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.turn import Turn
 from psvideo.plates.align.packed import packed
+from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 
@@ -22,6 +23,16 @@ def upright(plate: LightPlate, turn: Turn) -> LightPlate:
     picture = packed(mixture_of(turn.upright(plate.image)), plate.saturation)
     sideways = plate.sideways != turn.transposed
     return replace(plate, picture=picture, seen=_seen(plate, turn), shown_s=_shown_s(plate, turn), sideways=sideways)
+
+
+def upright_window(found: Separated, turn: Turn) -> Separated:
+    """Return a window's ambient light as it is to be seen, (row, col) in all its pictures."""
+    if turn.is_none:
+        return found
+    known = np.broadcast_to(found.known[:, None], found.image.shape[:2])
+    return replace(
+        found, image=turn.upright(found.image), stood=turn.upright(found.stood), known=turn.upright(np.array(known))
+    )
 
 
 def _seen(plate: LightPlate, turn: Turn) -> NDArray[np.bool_]:

@@ -70,7 +70,7 @@ class Separated:
     """What a window of frames shows of the ambient light of one exposure.
 
     begins: its first frame. image: as a frame. stood: (block row, block col), True where it was measured, False where
-    it was guessed from around. known: (row,).
+    it was guessed from around. known: (row,), or (row, col) once it was turned upright.
     """
 
     begins: int

@@ -125,7 +125,8 @@ class Observed:
 
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames showed without a dark slot."""
-        known = np.repeat(found.known[:, None], found.image.shape[1], axis=1)
+        known = found.known if found.known.ndim == 2 else found.known[:, None]
+        known = np.broadcast_to(known, found.image.shape[:2])
         self._dark = Dark(level=np.array(brightest_channel(thinned(found.image))), known=thinned(known))
         self.ambient_measured[found.begins] = float(found.stood.mean())
 
