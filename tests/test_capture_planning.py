@@ -1,5 +1,6 @@
 """Plans keep the rolling rule for both clocks at their worst, wishes become flashes, and dangers are named."""
 
+import io
 import itertools
 import re
 from dataclasses import replace
@@ -10,10 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from rich.console import Console
 
 from psvideo.capture.cautions import shoot_cautions
 from psvideo.capture.planning import Shoot, make_plan, plan_shoot
 from psvideo.capture.request import CameraWish, Limits, ShootRequest, choose_camera
+from psvideo.capture.tables import shoot_report
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.cli.options.capture import ShootWords
 from psvideo.cli.options.shoot_words import parse_request
@@ -21,6 +24,7 @@ from psvideo.cli.spelling import spelled
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan, parse_plan
 from psvideo.model.camera import Camera
+from psvideo.model.cost.in_step import never_shown
 from psvideo.model.cost.motion_cost import motion_cost
 from psvideo.model.cost.shoot_figures import shoot_figures
 from psvideo.model.plan import Plan
@@ -44,6 +48,13 @@ def kinds(shoot: Shoot) -> set[str]:
 
 def text_of(shoot: Shoot, kind: str) -> str:
     return " ".join(caution.text for caution in shoot.cautions if caution.kind == kind)
+
+
+def table_text(shoot: Shoot) -> str:
+    console = Console(file=io.StringIO(), width=200)
+    with console.capture() as shown:
+        console.print(*shoot_report(shoot, preset=None))
+    return shown.get()
 
 
 ANY_REQUEST = st.builds(
@@ -115,6 +126,16 @@ def test_every_board_plays_the_plan_of_a_fast_camera_whose_cycle_is_as_long_as_i
         planned(**fast, dark_every=most + 1)
 
 
+@pytest.mark.parametrize(("dark_slot", "most"), [(None, 38), ("0.4s", 38), ("0.001ms", 38)])
+def test_a_cycle_that_is_advised_is_played_with_its_dark_slot(dark_slot: str | None, most: int) -> None:
+    slow = {"fps": "2", "readout": "300ms", "flash": "10ms", "dark_slot": dark_slot}
+    longest = planned(**slow, dark_every=most).plan
+    assert longest.cycle_s <= 60 < replace(longest, dark_every=most + 1).cycle_s
+    with pytest.raises(UsageError, match=f"Give {most} or fewer") as refused:
+        planned(**slow, dark_every=most + 1)
+    assert f"in {replace(longest, dark_every=most + 1).cycle_s:.3g} s" in str(refused.value)
+
+
 def test_dark_slots_that_a_fast_cameras_board_cannot_make_rarer_are_warned_of() -> None:
     figures = planned(fps="1000", readout="0.9ms", flash="0.1ms")
     assert 3.0 < figures.figures.dark_slot_rate_hz < 4.0
@@ -148,6 +169,34 @@ def test_the_largest_blur_becomes_the_longest_flash_that_keeps_it(blur_px: float
 def test_the_largest_duty_is_kept_and_used_up(duty: float, count: int, marker: str) -> None:
     lights = ",".join(f"l{index}" for index in range(count))
     shoot = planned(flash=None, max_duty=str(duty), lights=lights, marker=marker)
+    most = max(light.duty for light in shoot.figures.lights)
+    assert most <= duty * (1 + 1e-9)
+    if "duty" in (shoot.chosen or ""):
+        assert most >= 0.98 * duty
+    assert "duty" not in kinds(shoot)
+
+
+@given(
+    st.floats(0.002, 0.4),
+    st.integers(1, 8),
+    st.sampled_from(["rolling", "half-rate", "synced"]),
+    st.sampled_from(
+        [
+            {"marker": "long"},
+            {"marker": "none"},
+            {"marker": "dark", "dark_every": 1},
+            {"marker": "dark", "dark_every": 3},
+            {"marker": "dark", "dark_every": 1, "dark_slot": "0.3ms"},
+            {"marker": "dark", "dark_every": 2, "dark_slot": "4ms"},
+        ]
+    ),
+)
+@settings(deadline=None)
+def test_the_largest_duty_counts_dark_slots_and_holds_in_every_mode(
+    duty: float, count: int, mode: str, marker: dict[str, object]
+) -> None:
+    lights = ",".join(f"l{index}" for index in range(count))
+    shoot = planned(flash=None, max_duty=str(duty), lights=lights, readout="1ms", mode=mode, **marker)
     most = max(light.duty for light in shoot.figures.lights)
     assert most <= duty * (1 + 1e-9)
     if "duty" in (shoot.chosen or ""):
@@ -197,7 +246,7 @@ def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None
         ({"marker": "bright"}, "dark, coded, long, none"),
         ({"dark_every": 0}, "--dark-every"),
         ({"dark_every": 30_000}, "Give 79"),
-        ({"fps": "2", "dark_every": 41}, "in 61.6 s, and boards hold 240 flashes and play 60 s at most. Give 39 or"),
+        ({"fps": "2", "dark_every": 41}, "in 62.1 s, and boards hold 240 flashes and play 60 s at most. Give 39 or"),
         ({"black": float("nan")}, "--black nan: expected a code value"),
         ({"white": float("inf")}, "--white inf: expected a code value"),
         ({"marker": "none", "dark_slot": "1ms"}, "--dark-slot"),
@@ -293,6 +342,39 @@ def test_limits_of_the_leds_that_a_given_flash_passes_are_named_with_what_would_
     assert not {"pulse", "duty"} & kinds(planned(flash="0.5ms", max_pulse="1ms", max_duty="2%"))
 
 
+@pytest.mark.parametrize("mode", ["rolling", "half-rate", "synced"])
+@pytest.mark.parametrize("marker", [{"marker": "none"}, {"marker": "dark", "dark_every": 1}])
+def test_the_flash_that_is_advised_for_a_duty_uses_it_up_in_every_mode(mode: str, marker: dict[str, object]) -> None:
+    given_words = {"mode": mode, "max_duty": "8%", "readout": "0", **marker}
+    advised = re.search(r"Flashes of ([\d.]+) ms", text_of(planned(flash="8ms", **given_words), "duty"))
+    assert advised is not None
+    fitting = planned(flash=f"{advised[1]}ms", **given_words)
+    assert [light.duty for light in fitting.figures.lights] == pytest.approx([0.08] * 3, rel=1e-3)
+
+
+def test_only_flashes_of_a_triggered_plan_are_called_cut() -> None:
+    triggered = {"mode": "synced", "shutter": 180.0, "readout": "0", "marker": "dark", "dark_every": 1}
+    assert "synced" not in kinds(planned(flash="1ms", dark_slot="4.9ms", **triggered))
+    plan = planned(flash="1ms", dark_slot="4.9ms", **triggered).plan
+    for slot, cut in ((3, False), (0, True)):
+        flashes = list(plan.flashes)
+        flashes[slot] = replace(flashes[slot], duration_s=8e-3)
+        longer = replace(plan, flashes=tuple(flashes))
+        cautions = shoot_cautions(longer, shoot_figures(longer))
+        assert any(caution.kind == "synced" for caution in cautions) == cut
+
+
+def test_missing_rows_that_round_to_none_are_not_spoken_of() -> None:
+    """At 324 degrees a row is blind for 1 ms of 10: hardly longer than the flash."""
+    dust = planned(shutter=324.0, flash="0.9999ms")
+    assert 0 < dust.figures.missing_row_share < 1e-4
+    assert "blind" not in kinds(dust)
+    assert "missing rows" not in table_text(dust)
+    some = planned(shutter=324.0, flash="0.94ms")
+    assert "1% of the rows" in text_of(some, "blind")
+    assert "missing rows" in table_text(some)
+
+
 def test_rows_that_no_frame_sees_are_warned_of() -> None:
     shoot = planned(shutter=180.0)
     assert shoot.figures.missing_row_share == pytest.approx(0.5 - 0.08)
@@ -314,6 +396,29 @@ def test_a_strobe_in_step_with_the_frames_is_warned_of_with_a_dark_time_that_is_
     assert better is not None
     assert "in-step" not in kinds(planned(**{**in_step, "dark": better[1]}))
     assert "in-step" not in kinds(planned(**{**in_step, "shutter": 360.0, "dark": "12.5ms"}))
+
+
+def test_a_slow_camera_that_only_films_long_is_not_said_to_be_in_step() -> None:
+    """At 1 frame a second ten rounds do not show every row, and sixty do: the rounds drift past the frames."""
+    slow = planned(fps="1", readout="900ms", shutter=170.0, flash="10ms", dark_every=1)
+    assert never_shown(slow.plan, lasts_s=10.0) > 0.1
+    assert never_shown(slow.plan, lasts_s=100.0) == 0
+    assert "in-step" not in kinds(slow)
+
+
+@pytest.mark.parametrize(("drift", "said"), [(0.0, "however long the take"), (20e-6, "in a take of 10 s")])
+def test_a_strobe_that_slowly_drifts_is_in_step_for_a_take_and_not_for_ever(drift: float, said: str) -> None:
+    dark = f"{9 * (1 + drift)}ms"
+    shoot = planned(shutter=180.0, flash="1ms", dark=dark, marker="none")
+    assert (never_shown(shoot.plan, lasts_s=10_000.0) > 0) == (drift == 0)
+    assert said in text_of(shoot, "in-step")
+
+
+def test_a_half_rate_strobe_in_step_is_not_told_to_leave_half_rate_for_another_dark_time() -> None:
+    shoot = planned(shutter=180.0, flash="1ms", mode="half-rate", dark_every=1)
+    assert "or `mode` to rolling" in text_of(shoot, "in-step")
+    assert "dark_s" not in text_of(shoot, "in-step")
+    assert "in-step" not in kinds(planned(shutter=180.0, flash="1ms", dark_every=1))
 
 
 def test_a_given_flash_that_breaks_a_wish_for_sharpness_or_light_is_warned_of() -> None:

@@ -303,6 +303,27 @@ def test_a_plan_whose_camera_was_put_right_keeps_its_log_and_one_that_asks_for_o
     assert warned(replace(plan, dark_every=2)), "the same flashes in another cycle"
 
 
+@pytest.mark.parametrize("ticks", [1600, 1601, 2003])
+def test_a_flash_of_full_and_part_power_in_any_number_of_ticks_keeps_its_log(
+    tmp_path: Path, make_plan: Callable[..., Plan], ticks: int
+) -> None:
+    """Bursts that do not divide a flash evenly are one tick longer than the flash divided by their number."""
+    path, log = tmp_path / "plan.toml", tmp_path / "strobe.json"
+    asked, slot_s = make_plan(lights=("key", "fill")), ticks * 0.5e-6
+    flashes = (
+        PlannedFlash(lights={"key": 1.0, "fill": 0.5}, duration_s=slot_s),
+        PlannedFlash(lights={}, duration_s=slot_s),
+    )
+    plan = Plan(camera=asked.camera, flashes=flashes, dark_s=0.0101)
+    path.write_text(format_plan(plan))
+    direct = ("--wiring", "direct", "--rounds", 1, "--log", log, "-q")
+    assert run("strobe", "run", path, "--port", "emulated", *direct) == 0
+    assert read_log(log).flashes[0].duration_ticks == ticks
+    right = replace(plan, camera=replace(plan.camera, readout_s=0.9 * (plan.camera.readout_s or 0.01)))
+    path.write_text(format_plan(right))
+    assert as_played(read_plan(path), path).warning is None
+
+
 def test_a_log_comes_back_as_it_was_and_a_broken_one_is_named(plan_file: Path) -> None:
     log = plan_file.with_name("strobe.json")
     assert run("strobe", "run", plan_file, "--port", "emulated", "--rounds", 1, "--log", log, "-q") == 0

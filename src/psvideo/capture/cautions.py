@@ -47,7 +47,7 @@ def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None =
         *about_blind_time(plan, figures),
         *about_three_frames(plan, figures),
         *about_motion(figures),
-        *about_the_leds(figures, limits),
+        *about_the_leds(plan, figures, limits),
         *about_synced_rows(plan, figures),
     )
 

@@ -109,7 +109,7 @@ def about_seizures(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
         )
 
 
-def about_the_leds(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
+def about_the_leds(plan: Plan, figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
     """Warn of pulses that are longer, or come more often, than the LEDs bear."""
     too_long: dict[float, list[str]] = {}
     too_often: dict[float, list[LightFigures]] = {}
@@ -124,7 +124,7 @@ def about_the_leds(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
         yield warning("pulse", text)
     for duty, lights in too_often.items():
         limit_share = limits.max_duty or 1.0
-        fits_s = _flash_for_duty_s(figures, lights[0], limit_share)
+        fits_s = _flash_for_duty_s(plan, lights[0], limit_share)
         yield warning(
             "duty",
             f"{_and([light.name for light in lights])}: on for {duty:.2%} of the time, over the limit of "
@@ -133,10 +133,18 @@ def about_the_leds(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
         )
 
 
-def _flash_for_duty_s(figures: ShootFigures, light: LightFigures, duty: float) -> float:
-    """Return the flash at which the light's duty is met if all lights take it and the dark times stay."""
-    dark_s = (1 - sum(other.duty for other in figures.lights)) / light.rate_hz
-    return duty * dark_s / (1 - duty * figures.flash_rate_hz / light.rate_hz)
+def _flash_for_duty_s(plan: Plan, light: LightFigures, duty: float) -> float:
+    """Return the flash at which the light's duty is met if all lights take it: in rolling plans the dark times stay, in
+    others the time from flash to flash. Dark slots as long as a flash may become shorter with it."""
+    slots = plan.cycle_slots
+    own = sum(light.name in plan.flashes[slot].lit for slot in slots)
+    if plan.mode != "rolling":
+        return duty * len(slots) * plan.camera.frame_period_s * (2 if plan.mode == "half-rate" else 1) / own
+    dark_slots_s = [plan.flashes[slot].duration_s for slot in slots if plan.flashes[slot].is_dark]
+    lit, dark_s = len(slots) - len(dark_slots_s), len(slots) * plan.dark_s
+    ends = ((lit, dark_s + sum(dark_slots_s)), (len(slots), dark_s))
+    fits = [duty * stays_s / (own - duty * grows) for grows, stays_s in ends if own > duty * grows]
+    return min(*fits, light.longest_pulse_s) if fits else light.longest_pulse_s
 
 
 def _and(names: Sequence[str]) -> str:

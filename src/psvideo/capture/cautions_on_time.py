@@ -4,9 +4,16 @@ import math
 from collections.abc import Iterator
 
 from psvideo.capture.caution import Caution, note, warning
-from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
+from psvideo.model.cost.in_step import (
+    IN_STEP,
+    dark_s_out_of_step,
+    frames_in_step,
+    never_shown,
+    stays_in_step,
+    usual_take_s,
+)
 from psvideo.model.cost.motion_cost import LEAST_PX, cost_words, motion_cost
-from psvideo.model.cost.shoot_figures import ShootFigures, SlotFigures
+from psvideo.model.cost.shoot_figures import LEAST_MISSING, ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
 from psvideo.model.units import show_ppm, show_seconds
 
@@ -37,7 +44,7 @@ def about_blind_time(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
     never = never_shown(plan)
     if never > IN_STEP:
         yield warning("in-step", in_step_words(plan, never))
-    elif figures.missing_row_share > 0:
+    elif figures.missing_row_share >= LEAST_MISSING:
         yield warning(
             "blind",
             f"At a shutter of {plan.camera.shutter_deg:.4g} degrees {figures.missing_row_share:.0%} of the rows of "
@@ -47,13 +54,16 @@ def about_blind_time(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
 
 
 def in_step_words(plan: Plan, never: float) -> str:
-    """Say that rows never see a light since the strobe keeps step with the frames, and which dark time avoids it."""
+    """Say that rows never see a light since the strobe keeps step with the frames, and what avoids it."""
     other_s = dark_s_out_of_step(plan)
     longer = "" if other_s is None else f", or `dark_s` to {show_seconds(other_s)}"
+    if plan.mode == "half-rate":
+        longer = ", or `mode` to rolling"
+    take = ", however long the take" if stays_in_step(plan, never) else f" in a take of {usual_take_s(plan):.3g} s"
     return (
         f"The strobe keeps step with the frames: every {frames_in_step(plan)} frames its flashes meet the same rows, "
-        f"and at a shutter of {plan.camera.shutter_deg:.4g} degrees {never:.0%} of the rows never see a light, however "
-        f"long the take. Set the shutter to 360 degrees{longer}."
+        f"and at a shutter of {plan.camera.shutter_deg:.4g} degrees {never:.0%} of the rows never see a light"
+        f"{take}. Set the shutter to 360 degrees{longer}."
     )
 
 
@@ -111,7 +121,7 @@ def about_synced_rows(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
     if plan.mode != "synced":
         return
     open_s = plan.camera.exposure_s - abs(plan.camera.readout_s or 0.0)
-    longest_s = max(slot.duration_s for slot in figures.slots)
+    longest_s = max((slot.duration_s for slot in figures.slots if not slot.is_dark), default=0.0)
     if longest_s > open_s * (1 + 1e-9):
         yield warning(
             "synced",

@@ -76,22 +76,24 @@ def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
     if request.marker == "coded":
         return replace(plan, dark_code=_longest_code(len(lit)))
     round_s = sum(flash.duration_s + plan.dark_s for flash in lit)
-    most = _most_dark_every(len(lit), round_s)
+    dark_slot_s += plan.dark_s
+    most = _most_dark_every(len(lit), round_s, dark_slot_s)
     if request.dark_every is not None:
-        _refuse_long_cycle(request.dark_every, most, lights=len(lit), round_s=round_s)
+        cycle_s = request.dark_every * round_s + dark_slot_s
+        _refuse_long_cycle(request.dark_every, most, lights=len(lit), cycle_s=cycle_s)
     return replace(plan, dark_every=request.dark_every or min(most, math.ceil(DARK_SLOT_EVERY_S / round_s)))
 
 
-def _most_dark_every(lights: int, round_s: float) -> int:
+def _most_dark_every(lights: int, round_s: float, dark_slot_s: float) -> int:
     """Return how many rounds a cycle with one dark slot can have that every board holds and plays, 1 at least."""
-    return max(1, min((BOARD_STEPS - 1) // lights, int(MOST_CYCLE_S / round_s)))
+    return max(1, min((BOARD_STEPS - 1) // lights, int((MOST_CYCLE_S - dark_slot_s) / round_s)))
 
 
-def _refuse_long_cycle(dark_every: int, most: int, *, lights: int, round_s: float) -> None:
+def _refuse_long_cycle(dark_every: int, most: int, *, lights: int, cycle_s: float) -> None:
     if dark_every > most:
         raise UsageError(
             f"`dark_every` {dark_every}: the cycle would be {dark_every * lights + 1} flashes in "
-            f"{dark_every * round_s:.3g} s, and boards hold {BOARD_STEPS} flashes and play {MOST_CYCLE_S:.0f} s at "
+            f"{cycle_s:.3g} s, and boards hold {BOARD_STEPS} flashes and play {MOST_CYCLE_S:.0f} s at "
             f"most. Give {most}{' or fewer' if most > 1 else ''}."
         )
 

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from psvideo.capture.cameras import CameraMode
 from psvideo.capture.planning import Shoot
-from psvideo.model.cost.shoot_figures import ShootFigures, SlotFigures
+from psvideo.model.cost.shoot_figures import LEAST_MISSING, ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
 from psvideo.model.units import show_ppm, show_rate, show_seconds
 
@@ -68,7 +68,7 @@ def _deciding_rows(plan: Plan, figures: ShootFigures) -> Iterator[tuple[str, str
     yield "dark time", show_seconds(plan.dark_s) + _margin(plan, figures)
     if plan.mode != "synced":
         yield "partial rows", f"{figures.partial_row_share:.1%} of each plate, {_partial_rows(plan)}"
-    if figures.missing_row_share:
+    if figures.missing_row_share >= LEAST_MISSING:
         yield "missing rows", f"{figures.missing_row_share:.1%} of each plate, seen by no frame"
     if figures.motion_per_flash_px is not None:
         yield (

@@ -89,14 +89,36 @@ def flash_for_duty_s(request: ShootRequest, max_duty: float) -> float:
 
     That is the long marker's where there is one; the other lights' flashes are shorter then, and the round with them.
     """
-    period_s, count = request.camera.frame_period_s, len(request.lights)
-    if request.mode != "rolling":
-        return max_duty * count * period_s * (2 if request.mode == "half-rate" else 1)
+    period_s, dark_slots = request.camera.frame_period_s, _dark_slots_of_a_round(request)
+    slots = len(request.lights) + dark_slots
+    if request.mode == "synced":
+        return max_duty * slots * period_s
+    lit = 1 + (len(request.lights) - 1) / _longest_by(request)
+    slot_s = request.dark_slot_s or 0.0
+    grows = lit if request.dark_slot_s else lit + dark_slots
+    if request.mode == "half-rate" and not request.dark_s:
+        # The longest slot, the flash or the dark one, starts every two frames; dark times shrink by its length.
+        by_flash_s = _meets(max_duty, grows=grows - slots, stays_s=slots * 2 * period_s + dark_slots * slot_s)
+        by_slot_s = _meets(max_duty, grows=grows, stays_s=slots * (2 * period_s - slot_s) + dark_slots * slot_s)
+        return min(by_flash_s, by_slot_s) if request.marker in ("dark", "coded") else by_flash_s
     dark_s = request.dark_s or default_dark_s(
         request.camera, (), mode="rolling", clock_tolerance_ppm=request.clock_tolerance_ppm
     )
-    lit_share = max_duty * (1 + (count - 1) / _longest_by(request))
-    return max_duty * count * dark_s / (1 - lit_share) if lit_share < 1 else math.inf
+    return _meets(max_duty, grows=grows, stays_s=slots * dark_s + dark_slots * slot_s)
+
+
+def _meets(max_duty: float, *, grows: float, stays_s: float) -> float:
+    """Return the flash that is ``max_duty`` of a round, which lasts ``grows`` times the flash and ``stays_s``."""
+    share = max_duty * grows
+    return max_duty * stays_s / (1 - share) if share < 1 else math.inf
+
+
+def _dark_slots_of_a_round(request: ShootRequest) -> float:
+    """Return how many dark slots a round has in the mean, at least: a code has more than one in two rounds, and where
+    the plan chooses how often they come they are few."""
+    if request.marker == "coded":
+        return 0.5
+    return 1 / request.dark_every if request.marker == "dark" and request.dark_every else 0.0
 
 
 def _longest_by(request: ShootRequest) -> float:

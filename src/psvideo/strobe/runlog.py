@@ -180,9 +180,14 @@ def _plays(plan: Plan, log: RunLog) -> bool:
 
 
 def _slot_of(flash: PlayedFlash, log: RunLog) -> Slot:
-    """Return what was sent for a flash; no burst is ever cut short."""
+    """Return what was sent for a flash: no burst is ever cut short, and at full power there are none."""
     bursts = -(-flash.duration_ticks // flash.period_ticks)
-    pairs = sorted({(log.lines[name], ticks // bursts) for name, ticks in flash.lit_ticks.items()})
+    pairs = sorted(
+        {
+            (log.lines[name], flash.period_ticks if ticks == flash.duration_ticks else ticks // bursts)
+            for name, ticks in flash.lit_ticks.items()
+        }
+    )
     lit = tuple(Lit(line=line, on=on) for line, on in pairs)
     return Slot(slot=0, duration=flash.duration_ticks, dark=log.dark_ticks, period=flash.period_ticks, lit=lit)
 

@@ -12,10 +12,12 @@ import numpy as np
 from psvideo.model.plan import Plan
 from psvideo.model.rows.recipe import LEAST_SHARE
 
-TAKE_S = 10.0
-"""How long a take is thought to be where it is not filmed yet; of longer ones more rows are shown."""
-SOON_S = 1.0
-"""In so short a take every row is to see every light at another dark time."""
+TAKE_S, TAKE_CYCLES = 10.0, 64
+"""How long a take is thought to be where it is not filmed yet, the longer of the two: slow cameras film longer."""
+SOON_S, SOON_CYCLES = 1.0, 8
+"""In so short a take, the longer of the two, every row is to see every light at another dark time."""
+LONG_CYCLES, SAME_SHARE = 1000, 0.005
+"""What stays within this share for so many cycles does not drift: it holds however long a take is."""
 IN_STEP = 0.02
 """A smaller share of the rows is not worth a word."""
 FINEST, MOST = 1 / 200, 0.25
@@ -23,9 +25,15 @@ FINEST, MOST = 1 / 200, 0.25
 MOST_FRAMES = 64
 
 
-def never_shown(plan: Plan, *, lasts_s: float = TAKE_S, clock_offset_ppm: float = 0.0) -> float:
+def usual_take_s(plan: Plan) -> float:
+    """Return how long a take of this plan is thought to be where it is not filmed yet."""
+    return max(TAKE_S, TAKE_CYCLES * plan.cycle_s)
+
+
+def never_shown(plan: Plan, *, lasts_s: float | None = None, clock_offset_ppm: float = 0.0) -> float:
     """Return the share of the rows, in the mean over lights and first moments, that see a light in no round of a take
-    of this length. 0 at 360 degrees and in synced plans."""
+    of this length, or of a usual one. 0 at 360 degrees and in synced plans."""
+    lasts_s = usual_take_s(plan) if lasts_s is None else lasts_s
     period_s = plan.camera.frame_period_s
     if plan.mode == "synced" or plan.camera.exposure_s >= period_s:
         return 0.0
@@ -42,6 +50,11 @@ def never_shown(plan: Plan, *, lasts_s: float = TAKE_S, clock_offset_ppm: float 
     return float(np.mean(shares))
 
 
+def stays_in_step(plan: Plan, never: float) -> bool:
+    """Tell whether no more rows see a light in far longer takes than in a usual one, where ``never`` see none."""
+    return never_shown(plan, lasts_s=LONG_CYCLES * plan.cycle_s) >= never - SAME_SHARE
+
+
 def frames_in_step(plan: Plan) -> int:
     """Return after how many frames the flashes meet the same rows again, as nearly as they do within 64 frames."""
     frames = plan.cycle_s / plan.camera.frame_period_s
@@ -52,10 +65,13 @@ def frames_in_step(plan: Plan) -> int:
 
 def dark_s_out_of_step(plan: Plan) -> float | None:
     """Return the shortest dark time, longer than the plan's, at which every row soon sees every light; None where a
-    quarter of a frame more does not help."""
+    quarter of a frame more does not help, and in half-rate plans, which last two frames a flash at no other."""
+    if plan.mode != "rolling":
+        return None
+    soon_s = max(SOON_S, SOON_CYCLES * plan.cycle_s)
     step_s = FINEST * plan.camera.frame_period_s
     for more in range(1, round(MOST / FINEST) + 1):
         dark_s = plan.dark_s + more * step_s
-        if never_shown(replace(plan, dark_s=dark_s), lasts_s=SOON_S) == 0:
+        if never_shown(replace(plan, dark_s=dark_s), lasts_s=soon_s) == 0:
             return dark_s
     return None

@@ -14,6 +14,8 @@ from psvideo.model.plan import Plan, PlannedFlash
 
 SEIZURE_HZ = (3.0, 70.0)
 """Flashes at these rates can harm people with photosensitive epilepsy (IEEE 1789-2015)."""
+LEAST_MISSING = 0.005
+"""A smaller share of missing rows, which rounds to 0 %, is not worth a word."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -105,6 +105,7 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterat
             found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {opened}, and the strobe "
             f"keeps step with the frames, so that every {frames_in_step(plan)} frames its flashes meet the same rows.",
             advice="Shoot at 360 degrees"
+            + (", or in rolling mode" if plan.mode == "half-rate" else "")
             + ("." if other_s is None else f", or with a dark time (dark_s) of {other_s * 1e3:.4g} ms."),
         )
     elif borrowed > MOST_UNSEEN and unseen <= LOST_UNSEEN:
