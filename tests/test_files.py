@@ -186,6 +186,10 @@ BROKEN_RIGS = {
     "unknown key": ('name = "a"\ndirektion = [0.0, 0.0, 1.0]', "did you mean 'direction'?"),
     "a name that is taken": ('name = "ambient"\ndirection = [0.0, 0.0, 1.0]', "cannot be a light's name"),
     "no strength": ('name = "a"\ndirection = [0.0, 0.0, 1.0]\nintensity = 0.0', "greater than 0"),
+    "strength in words": (
+        'name = "a"\ndirection = [0.0, 0.0, 1.0]\nintensity = "full"',
+        "key 'light[1].intensity' is 'full': expected a number or a list.",
+    ),
 }
 
 

@@ -149,6 +149,29 @@ WARNINGS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
 }
 
 
+def test_what_is_said_of_lights_is_true_of_these_lights(tmp_path: Path, shot: Path, plan: Plan) -> None:
+    near = tuple(Light(name=name, position_m=(x, 0.1, 0.2)) for name, x in zip("abc", (-1.0, 0.0, 1.0), strict=True))
+    for lights, said in (
+        (near, "near, with positions"),
+        ((*near, Light(name="d", direction=(0.0, 0.6, 0.8))), "3 of them near, with positions; the others distant"),
+    ):
+        (tmp_path / "near.toml").write_text(format_rig(Rig(lights=lights)))
+        told = lines(describe(tmp_path / "near.toml"), "ok")
+        assert said in told
+        assert ("distant" in told) == (len(lights) > 3)
+    one = dataclasses.replace(plan, flashes=tuple(dataclasses.replace(plan.flashes[0]) for _ in range(2)))
+    put_plan(shot, one)
+    assert "names are a guess" not in lines(describe(shot / "plan.toml"), "warn")
+
+
+def test_pictures_that_show_no_light_are_all_counted(tmp_path: Path) -> None:
+    put_frames(tmp_path, range(1, 6))
+    for name in "wxyz":
+        (tmp_path / f"{name}_mask.png").write_bytes((tmp_path / "shot.0001.png").read_bytes())
+    told = lines(describe(tmp_path), "ok")
+    assert "w_mask.png, x_mask.png, y_mask.png and 1 more show no light" in told
+
+
 @pytest.mark.parametrize("name", WARNINGS)
 def test_what_may_cost_accuracy_is_a_warning(shot: Path, plan: Plan, name: str) -> None:
     spoil, message = WARNINGS[name]
@@ -200,6 +223,8 @@ def test_a_timing_says_how_sure_it_is(tmp_path: Path) -> None:
     found = describe(tmp_path / "timing.json")
     assert (found.kind, found.facts["flashes"], found.facts["complete"]) == ("timing", 2, 1)
     assert "found by marker" in lines(found, "ok")
+    (tmp_path / "given.json").write_text(format_timing(make_timing(order="given")))
+    assert "the order of the lights was given" in lines(describe(tmp_path / "given.json"), "ok")
     doubtful = make_timing(order="guess", clock_offset_ppm=-1003.0, dropped_frames=(DroppedFrames(after=16, count=2),))
     (tmp_path / "timing.json").write_text(format_timing(doubtful))
     said = lines(describe(tmp_path / "timing.json"), "warn")

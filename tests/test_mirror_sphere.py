@@ -16,7 +16,7 @@ from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean
 from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
 from psvideo.calibrate.mirror.lights import calibrate_lights
 from psvideo.calibrate.mirror.measured import MirrorCalibration
-from psvideo.calibrate.mirror.sighting import SphereNotFoundError, sight_spheres
+from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
 from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.cli.app import main
@@ -90,6 +90,43 @@ def test_two_spheres_show_where_near_lights_are() -> None:
     assert all(light.position_m and light.direction is None for light in rig.lights)
     with pytest.raises(PsvideoError, match="the light is near"):
         calibrate_lights(sightings)
+
+
+def test_crops_of_several_sizes_place_no_light_and_say_why() -> None:
+    """A crop has its middle elsewhere than the lens's axis: what rests on it is placed wrongly."""
+    lens = Lens(width=480, height=220, focal=800.0)
+    looking = Looking(focal_px=lens.focal)
+    near = {name: Lamp(position=place) for name, place in NEAR.items()}
+
+    def sighted(lamps: Mapping[str, Lamp], crop: slice) -> list[Sighting]:
+        found = []
+        for place, part in (((-0.12, 0.0, -0.6), slice(None)), ((0.1, 0.01, -0.55), crop)):
+            grey = shoot(lens, [Ball(centre=place, radius_m=0.04)], lamps).grey
+            pictures = light_pictures(list(lamps), [picture[:, part] for picture in grey])
+            found += sight_spheres([pictures], looking, where="ball")
+        return found
+
+    whole = calibrate_lights(sighted(near, slice(None)), radius_m=0.04)
+    assert all(light.position_m is not None for light in whole.lights)
+    assert not any("cropped" in warning for warning in whole.warnings)
+    with pytest.raises(PsvideoError, match="give pictures that are not cropped for its position"):
+        calibrate_lights(sighted(near, slice(40, None)), radius_m=0.04)
+    distant = calibrate_lights(sighted(DISTANT, slice(10, None)), radius_m=0.04)
+    said = " ".join(distant.warnings)
+    assert "the pictures of the spheres are 480 x 220 and 470 x 220 pixels, so they were cropped" in said
+    assert "`radius_mm`" not in said, "it was given"
+
+
+def test_what_an_unknown_lens_costs_is_reckoned_by_the_pictures_width_wherever_its_axis_is() -> None:
+    said = []
+    pictures = shoot(WIDE, [ball_at(0.0)], DISTANT)
+    for middle in (WIDE.middle[0], WIDE.middle[0] - 100.0):
+        looking = Looking(principal_px=(middle, WIDE.middle[1]))
+        found = calibrate_lights(sight_spheres([pictures], looking, where="ball"))
+        said.append(next(warning for warning in found.warnings if "orthographic" in warning))
+    off_deg = np.degrees(np.arctan(100 / (WIDE.width / 2 / np.tan(np.radians(12.5)))))
+    assert f"{off_deg:.1f} degrees with a lens of 25" in said[1]
+    assert "0.0 degrees with a lens of 25" in said[0]
 
 
 def test_a_second_reflection_is_found_by_its_strength_or_the_light_is_left_out() -> None:

@@ -22,7 +22,8 @@ from psvideo.cli.app import main
 from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.stated import stated_by
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.rig_toml import format_rig
 from psvideo.inspect.describe import describe
 from psvideo.model.quantities import Aov
 from psvideo.model.turn import EXIF
@@ -635,6 +636,30 @@ def test_a_chrome_ball_under_the_same_lights_is_enough(tmp_path: Path) -> None:
     assert error_deg(tmp_path / "out") < 1.5
     assert "6 of 6 lights were measured on 1 sphere, as directions" in remarks(report)
     assert "belong to lights by name" in remarks(report)
+
+
+def test_photographs_of_another_size_than_the_balls_do_not_get_their_lens(tmp_path: Path) -> None:
+    """The middle of a picture that was cropped around the ball is not where the axis meets the photographs."""
+    folder, ball_folder = photographs(tmp_path / "photos", lit()), chrome(tmp_path / "ball")
+    for file in ball_folder.iterdir():
+        save16(file, np.asarray(Image.open(file), np.float64)[20:220, 30:230] / 65535)
+    report = ps.stills(folder, sphere=[ball_folder], focal_px=900.0, out=tmp_path / "out")
+    rig = ps.read_rig(tmp_path / "out" / "setup" / "rig.toml")
+    assert (rig.focal_px, rig.principal_px) == (None, None)
+    assert f"The photographs are {SIZE} x {SIZE} pixels and those of the spheres 200 x 200" in remarks(report)
+
+
+def test_a_focal_length_beside_a_rig_of_another_lens_is_refused(tmp_path: Path) -> None:
+    folder = photographs(tmp_path / "photos", lit())
+    lights = tuple(
+        ps.Light(name=name, direction=(float(x), float(y), float(z)))
+        for name, (x, y, z) in zip(NAMES, LIGHTS, strict=True)
+    )
+    (tmp_path / "rig.toml").write_text(format_rig(ps.Rig(lights=lights, focal_px=(300.0, 300.0))))
+    with pytest.raises(UsageError, match=r"`focal_px` is 250, and rig\.toml says that the lens is 300 pixels"):
+        ps.stills(folder, lights=tmp_path / "rig.toml", focal_px=250.0, out=tmp_path / "other")
+    ps.stills(folder, lights=tmp_path / "rig.toml", focal_px=300.0, out=tmp_path / "same")
+    assert ps.read_rig(tmp_path / "same" / "setup" / "rig.toml").focal_px == (300.0, 300.0)
 
 
 def test_chrome_balls_may_be_named_picture_by_picture_or_by_patterns(tmp_path: Path) -> None:

@@ -181,7 +181,7 @@ def _key_path(place: tuple[str | int, ...]) -> str:
     for part in place:
         if isinstance(part, int):
             path += f"[{part + 1}]"
-        elif "[" not in part and part not in {"float", "int", "str", "literal"}:
+        elif "[" not in part and part.removeprefix("constrained-") not in {"float", "int", "str", "literal"}:
             path += f".{part}" if path else part
     return path
 

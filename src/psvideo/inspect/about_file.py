@@ -94,7 +94,8 @@ def _rig(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
     near = [light.name for light in rig.lights if light.direction is None]
     findings = [ok(f"{len(rig.lights)} lights: {', '.join(rig.names)}")]
     if near:
-        findings.append(ok(f"{len(near)} of them near, with positions; the others distant, with directions"))
+        some = f"{len(near)} of them near, with positions; the others distant, with directions"
+        findings.append(ok(some if len(near) < len(rig.lights) else "near, with positions"))
     if len(rig.lights) < 3:
         findings.append(warn("normals need three lights or more"))
     plan = path.with_name(PLAN_FILE)
@@ -110,7 +111,7 @@ def _timing(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
     findings.append(
         warn("the order of the lights is a guess: give `first_light`")
         if timing.order == "guess"
-        else ok(f"the order of the lights was found by {timing.order}")
+        else ok(f"the order of the lights was {'' if timing.order == 'given' else 'found by '}{timing.order}")
     )
     offset = f"the strobe's clock is {timing.clock_offset_ppm:+.4g} ppm off the camera's"
     misnamed = abs(abs(timing.clock_offset_ppm) - MISNAMED_PPM) < NEAR_PPM

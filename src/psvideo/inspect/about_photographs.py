@@ -10,7 +10,7 @@ from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import PLAN_FILE
 from psvideo.inspect.findings import Finding, ok, warn
-from psvideo.model.units import counted
+from psvideo.model.units import counted, listed
 
 FEWEST, MOST = 3, 300
 """This many photographs of one subject are taken; what has more pictures is a clip."""
@@ -51,4 +51,5 @@ def _as_taken(pictures: Photographs) -> Iterator[Finding]:
 
 def _aside(files: tuple[Path, ...]) -> Iterator[str]:
     if files:
-        yield f"{', '.join(file.name for file in files[:FEWEST])} shows no light"
+        shows = "shows" if len(files) == 1 else "show"
+        yield f"{listed([file.name for file in files], FEWEST)} {shows} no light"

@@ -31,7 +31,7 @@ def plan_findings(plan: Plan) -> Iterator[Finding]:
         )
     if has_marker(plan):
         yield ok("its cycle shows which flash is which (a dark slot or a flash of another length)")
-    else:
+    elif len(plan.lights) > 1:
         yield warn("all its flashes are alike, so their names are a guess: give `first_light`")
 
 

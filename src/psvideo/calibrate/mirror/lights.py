@@ -13,7 +13,7 @@ import numpy as np
 from psvideo.calibrate.mirror.law import SURE_ERRORS, Crossing, Ray, crossing, mean_direction, mirrored_ray
 from psvideo.calibrate.mirror.measured import MeasuredLight, MirrorCalibration
 from psvideo.calibrate.mirror.mirror_doubts import doubts_of
-from psvideo.calibrate.mirror.sighting import Highlight, Sighting
+from psvideo.calibrate.mirror.sighting import Highlight, Sighting, cut_differently, lacking_for_positions
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 
@@ -26,11 +26,12 @@ MOST_POSITION_ERROR = 0.15
 def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = None) -> MirrorCalibration:
     """Return every light's direction or position from one or more sightings of mirror spheres.
 
-    ``radius_m`` is the spheres' radius; with it, a known focal length and two or more sightings, near lights get
-    positions. Raises PsvideoError where no light at all could be measured.
+    ``radius_m`` is the spheres' radius; with it, a known focal length and two or more sightings in pictures of one
+    size, near lights get positions. Raises PsvideoError where no light at all could be measured.
     """
+    known_m = None if cut_differently(sightings) else radius_m
     names = list(dict.fromkeys(one.light for sighting in sightings for one in sighting.highlights))
-    lights = tuple(_measured(name, sightings, radius_m) for name in names)
+    lights = tuple(_measured(name, sightings, known_m) for name in names)
     if all(light.fault for light in lights):
         reasons = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
         raise PsvideoError(
@@ -62,7 +63,8 @@ def _measured(name: str, sightings: Sequence[Sighting], radius_m: float | None) 
     rays += [
         ray for sighting, one in seen if one.alike and (ray := _agreeing(sighting, one, rays, radius_m)) is not None
     ]
-    return _joined(name, rays, can_cross=radius_m is not None and sightings[0].outline.view.focal_px is not None)
+    can_cross = radius_m is not None and sightings[0].outline.view.focal_px is not None
+    return _joined(name, rays, can_cross=can_cross, lacking=lacking_for_positions(sightings))
 
 
 def _ray(sighting: Sighting, place: FloatArray, one: Highlight, radius_m: float | None) -> Ray | None:
@@ -89,7 +91,7 @@ def _agreeing(sighting: Sighting, one: Highlight, rays: Sequence[Ray], radius_m:
     return nearest
 
 
-def _joined(name: str, rays: Sequence[Ray], *, can_cross: bool) -> MeasuredLight:
+def _joined(name: str, rays: Sequence[Ray], *, can_cross: bool, lacking: str) -> MeasuredLight:
     """Return a light as a position where its rays cross well, else as their mean direction."""
     mean, error_deg, excess = mean_direction(rays)
     meeting = crossing(rays) if can_cross and len(rays) > 1 else None
@@ -109,14 +111,14 @@ def _joined(name: str, rays: Sequence[Ray], *, can_cross: bool) -> MeasuredLight
             )
     spread = max(float(np.degrees(np.arccos(np.clip(ray.direction @ mean, -1, 1)))) for ray in rays)
     if 2 * spread > DISAGREE_DEG and excess > SURE_ERRORS and not can_cross:
-        return MeasuredLight(name=name, rays=tuple(rays), fault=_apart(2 * spread))
+        return MeasuredLight(name=name, rays=tuple(rays), fault=_apart(2 * spread, lacking))
     return MeasuredLight(name=name, rays=tuple(rays), direction=mean, error_deg=error_deg)
 
 
-def _apart(spread_deg: float) -> str:
+def _apart(spread_deg: float, lacking: str) -> str:
     return (
-        f"the spheres' directions differ by up to {spread_deg:.1f} degrees: the light is near (give `radius_mm` and "
-        "`focal_px` for its position), or one highlight is a wrong one"
+        f"the spheres' directions differ by up to {spread_deg:.1f} degrees: the light is near (give "
+        f"{lacking} for its position), or one highlight is a wrong one"
     )
 
 

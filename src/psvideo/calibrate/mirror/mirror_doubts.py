@@ -6,7 +6,7 @@ import numpy as np
 
 from psvideo.calibrate.mirror.law import SURE_ERRORS, mean_direction
 from psvideo.calibrate.mirror.measured import MeasuredLight
-from psvideo.calibrate.mirror.sighting import Sighting
+from psvideo.calibrate.mirror.sighting import Sighting, cut_differently, lacking_for_positions, size_px
 from psvideo.solve.normals.illumination import MAX_CONDITION
 
 SMALL_RADIUS_PX = 60.0
@@ -19,7 +19,12 @@ def doubts_of(
 ) -> tuple[str, ...]:
     """Return what an unknown lens, small or moving spheres, and each light's highlights leave open; ``radius_m`` as for
     ``calibrate_lights``."""
-    return (*_about_view(sightings), *_about_spheres(sightings), *_about_lights(lights, sightings, radius_m))
+    return (
+        *_about_view(sightings),
+        *_about_sizes(sightings, radius_m),
+        *_about_spheres(sightings),
+        *_about_lights(lights, sightings, radius_m),
+    )
 
 
 def _about_view(sightings: Sequence[Sighting]) -> list[str]:
@@ -28,7 +33,7 @@ def _about_view(sightings: Sequence[Sighting]) -> list[str]:
     if view.focal_px is not None:
         return []
     outline = max((sighting.outline for sighting in sightings), key=lambda one: view.off_axis_deg(one.place, 1000.0))
-    width = 2 * view.principal_px[0] + 1
+    width, _ = size_px(sightings[0])
     long_deg, normal_deg = (
         view.off_axis_deg(outline.place, width / 2 / np.tan(np.radians(field / 2))) for field in USUAL_FIELDS_DEG
     )
@@ -43,6 +48,18 @@ def _about_view(sightings: Sequence[Sighting]) -> list[str]:
         f"the angle by which the sphere stands off the lens's axis: {long_deg:.1f} degrees with a lens of "
         f"{USUAL_FIELDS_DEG[0]:.0f} degrees field of view, {normal_deg:.1f} with {USUAL_FIELDS_DEG[1]:.0f}.{seen} Give "
         "`focal_px`, or `focal_mm` and `sensor_mm`. The standard errors leave this out."
+    ]
+
+
+def _about_sizes(sightings: Sequence[Sighting], radius_m: float | None) -> list[str]:
+    """Say what pictures of several sizes cost."""
+    cut = cut_differently(sightings)
+    if not cut or (radius_m is None and sightings[0].outline.view.focal_px is None):
+        return []
+    return [
+        f"the pictures of the spheres are {cut} pixels, so they were cropped, and where the lens's axis is in them is "
+        "not known: lights get directions, wrong by about the angle by which a crop's middle is off the axis, and no "
+        "positions. Give whole pictures"
     ]
 
 
@@ -69,19 +86,20 @@ def _about_lights(lights: Sequence[MeasuredLight], sightings: Sequence[Sighting]
     good = [light for light in lights if not light.fault and light.direction is not None]
     left_out = [f"light {light.name!r} is left out of the rig: {light.fault}" for light in lights if light.fault]
     can_cross = radius_m is not None and sightings[0].outline.view.focal_px is not None
-    return [*left_out, *_disagreeing(good, can_cross=can_cross), *_clipped(sightings), *_in_a_plane(good)]
+    lacking = "" if can_cross and not cut_differently(sightings) else lacking_for_positions(sightings)
+    return [*left_out, *_disagreeing(good, lacking=lacking), *_clipped(sightings), *_in_a_plane(good)]
 
 
-def _disagreeing(good: Sequence[MeasuredLight], *, can_cross: bool) -> list[str]:
+def _disagreeing(good: Sequence[MeasuredLight], *, lacking: str) -> list[str]:
     """Name the lights that several spheres see in different directions, and that got no position."""
     excess = [light for light in good if len(light.rays) > 1 and mean_direction(light.rays)[2] > SURE_ERRORS]
     distant = [light.name for light in excess if light.position_m is None]
     if not distant:
         return []
     cause = (
-        "their rays do not cross well enough for a position: put the spheres further apart"
-        if can_cross
-        else "they stand near: give `radius_mm` and the focal length to get positions"
+        f"they stand near: give {lacking} to get positions"
+        if lacking
+        else "their rays do not cross well enough for a position: put the spheres further apart"
     )
     return [f"the spheres see the lights {', '.join(distant)} in different directions; {cause}"]
 

@@ -65,6 +65,23 @@ class Sighting:
     doubt: str = ""
 
 
+def size_px(sighting: Sighting) -> tuple[int, int]:
+    """Return width and height of the pictures on which a sphere was seen."""
+    rows, cols = sighting.picture.shape
+    return cols, rows
+
+
+def cut_differently(sightings: Sequence[Sighting]) -> str:
+    """Return the sizes of the spheres' pictures where they differ: where the lens's axis is in them is not known."""
+    sizes = dict.fromkeys(map(size_px, sightings))
+    return " and ".join(f"{cols} x {rows}" for cols, rows in sizes) if len(sizes) > 1 else ""
+
+
+def lacking_for_positions(sightings: Sequence[Sighting]) -> str:
+    """Return what is to be given for near lights to get positions, where it was not."""
+    return "pictures that are not cropped" if cut_differently(sightings) else "`radius_mm` and the focal length"
+
+
 def sight_spheres(
     sets: Iterable[LightPictures], looking: Looking, *, where: str, room: NDArray[np.float32] | None = None
 ) -> list[Sighting]:

@@ -10,7 +10,7 @@ from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_pairs import Pairs
 from psvideo.clip import Clip
 from psvideo.clip.stills import Photographs, look_at
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.formats.plan_toml import PLAN_FILE, format_plan
 from psvideo.formats.rig_toml import format_rig
@@ -26,6 +26,8 @@ from psvideo.solve.instants import Instant
 RIG, LP = "rig.toml", "lights.lp"
 SETUP = "setup"
 """The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
+SAME_FOCAL = 0.001
+"""Focal lengths that differ by a smaller share are the same, rounded."""
 NO_DARK = (
     "No picture is named dark or ambient, so the room is assumed dark. If it was not, photograph the subject with "
     "every light off as well."
@@ -54,7 +56,7 @@ def still_clip(
     if exposures is not None:
         rig = _scaled(rig, exposures[: len(rig.lights)])
         glance = None if glance is None else glance.exposed(exposures)
-    rig, lens = _through_lens(rig, pictures, looking)
+    rig, lens = _through_lens(rig, pictures, looking, known)
     doubt = curve_doubt(glance, pictures)
     write_text(place / RIG, format_rig(rig))
     plan = assemble_plan(
@@ -83,8 +85,9 @@ def still_clip(
 
 def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None:
     """Raise PsvideoError where lights' positions rest on pictures of another size: crops lose the lens's axis."""
-    size_px = pictures.header.turn.size(pictures.header.width_px, pictures.header.height_px)
-    if known.size_px is not None and known.size_px != size_px:
+    size_px = _size_px(pictures)
+    near = any(light.position_m is not None for light in known.rig.lights)
+    if near and known.size_px is not None and known.size_px != size_px:
         raise PsvideoError(
             f"{folder}: the photographs are {size_px[0]} x {size_px[1]} pixels and those of the spheres "
             f"{known.size_px[0]} x {known.size_px[1]}. Expected one size, whole pictures of one camera: near lights "
@@ -93,22 +96,48 @@ def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None
         )
 
 
-def _through_lens(rig: Rig, pictures: Photographs, looking: Looking) -> tuple[Rig, tuple[str, ...]]:
-    """Return the rig with the lens that was given, or that EXIF names; with what is to be said of it."""
+def _size_px(pictures: Photographs) -> tuple[int, int]:
+    return pictures.header.turn.size(pictures.header.width_px, pictures.header.height_px)
+
+
+def _through_lens(rig: Rig, pictures: Photographs, looking: Looking, known: KnownLights) -> tuple[Rig, tuple[str, ...]]:
+    """Return the rig with the lens that was given, or that EXIF names; with what is to be said of it. Raises UsageError
+    where the rig has another lens than is given."""
+    rig, left_out = _of_its_size(rig, pictures, known)
+    width_px, height_px = _size_px(pictures)
+    given_px = None if left_out else looking.view(width_px=width_px, height_px=height_px).focal_px
     if rig.focal_px is not None:
+        if given_px is not None and abs(given_px / rig.focal_px[0] - 1) > SAME_FOCAL:
+            raise UsageError(
+                f"`focal_px` is {given_px:.6g}, and {known.whose} says that the lens is {rig.focal_px[0]:.6g} pixels "
+                "long. Leave it out, or put it right in [camera] focal_px of the rig."
+            )
         return rig, ()
-    header = pictures.header
-    wide_px = header.turn.size(header.width_px, header.height_px)[0]
-    given_px = looking.focal_px or (looking.focal_widths * wide_px if looking.focal_widths else None)
     lens_px = given_px or lens_stated(pictures.stated)
     if lens_px is None:
-        return rig, ()
+        return rig, left_out
     said = (
-        ()
+        left_out
         if given_px
-        else (f"The lens is assumed to be {lens_px:.6g} pixels long, as EXIF says; shapes depend on it.",)
+        else (
+            *left_out,
+            f"The lens is assumed to be {lens_px:.6g} pixels long, as EXIF says; shapes depend on it.",
+        )
     )
     return replace(rig, focal_px=(lens_px, lens_px)), said
+
+
+def _of_its_size(rig: Rig, pictures: Photographs, known: KnownLights) -> tuple[Rig, tuple[str, ...]]:
+    """Return the rig without the lens of spheres whose pictures have another size than the photographs."""
+    size_px = _size_px(pictures)
+    if known.size_px is None or known.size_px == size_px or rig.focal_px is None:
+        return rig, ()
+    note = (
+        f"The photographs are {size_px[0]} x {size_px[1]} pixels and those of the spheres {known.size_px[0]} x "
+        f"{known.size_px[1]}, cropped or scaled, so the spheres' lens and its axis are not taken for the photographs'. "
+        "Give whole pictures, or a rig with [camera] focal_px."
+    )
+    return replace(rig, focal_px=None, principal_px=None), (note,)
 
 
 def _flashes(pairs: Pairs) -> list[PlannedFlash]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from psvideo.calibrate.light_files import pictures_in
 from psvideo.calibrate.mirror.lights import calibrate_lights
-from psvideo.calibrate.mirror.sighting import Sighting, sight_spheres
+from psvideo.calibrate.mirror.sighting import Sighting, cut_differently, sight_spheres, size_px
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_places import Place, grouped_pictures
 from psvideo.clip.stated import Stated, stated_by
@@ -28,7 +28,7 @@ SAME_LENS = 1.01
 class KnownLights:
     """Lights before they are paired with pictures. ``called`` are the names by which pictures may be found, ``own``
     whether the lights have names of their own to keep, ``whose`` what messages call the source. ``size_px`` (width,
-    height) are the pictures on which positions rest: photographs of another size lack the same lens's axis."""
+    height) are the pictures of spheres: in photographs of another size the lens's axis lies elsewhere."""
 
     rig: Rig
     called: tuple[str, ...]
@@ -78,13 +78,12 @@ def sphere_lights(
     places = grouped_pictures(spheres)
     looking, notes = _through_its_lens(looking, places)
     sightings = _sighted(places, looking, transfer=transfer, watch=watch, caller=caller)
-    cut = _cut_differently(sightings)
-    found = calibrate_lights(sightings, radius_m=None if cut else radius_m)
+    found = calibrate_lights(sightings, radius_m=radius_m)
     rig = found.rig
     if any(light.position_m is not None for light in rig.lights):
         rig = replace(rig, plane=plane_of(sightings, radius_m or 0.0))
     near = sum(light.position_m is not None for light in rig.lights)
-    what = f"{near} near, with positions" if near else _why_directions(sightings, radius_m, cut)
+    what = f"{near} near, with positions" if near else _why_directions(sightings, radius_m)
     note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
     whose = ", ".join(Path(one.called).name if isinstance(one, Place) else one.name for one in places)
     return KnownLights(
@@ -92,7 +91,7 @@ def sphere_lights(
         called=rig.names,
         own=False,
         whose=whose,
-        size_px=_size_px(sightings[0]) if near else None,
+        size_px=size_px(sightings[0]),
         notes=(*notes, note),
         warnings=tuple(found.warnings),
     )
@@ -140,26 +139,10 @@ def _sighted(
     return sightings
 
 
-def _size_px(sighting: Sighting) -> tuple[int, int]:
-    rows, cols = sighting.picture.shape
-    return cols, rows
-
-
-def _cut_differently(sightings: Sequence[Sighting]) -> str:
-    """Return the sizes of the spheres' pictures where they differ: where the lens's axis is in them is not known."""
-    sizes = dict.fromkeys(map(_size_px, sightings))
-    return " and ".join(f"{cols} x {rows}" for cols, rows in sizes) if len(sizes) > 1 else ""
-
-
-def _why_directions(sightings: Sequence[Sighting], radius_m: float | None, cut: str) -> str:
+def _why_directions(sightings: Sequence[Sighting], radius_m: float | None) -> str:
     """Return why lights seen on these spheres have no positions."""
-    if len(sightings) < 2:
+    if len(sightings) < 2 or cut_differently(sightings):
         return "as directions"
-    if cut:
-        return (
-            f"as directions: the pictures of the spheres are {cut} pixels, so they were cropped, and positions need to "
-            "know where the lens's axis is. Give whole pictures"
-        )
     lacking = ["`radius_mm`"] if radius_m is None else []
     if sightings[0].outline.view.focal_px is None:
         lacking.append("the lens (`focal_px`, or `focal_mm` with `sensor_mm`)")
