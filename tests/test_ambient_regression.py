@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from memory_frame import MemoryFrame
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient.ambient_regression import Separated, design_of, separated
@@ -42,7 +42,7 @@ def timing_of(plan: Plan, shot: Exposure) -> Timing:
 class Take:
     plan: Plan
     timing: Timing
-    frames: FloatArray
+    frames: Doubles
     plates: dict[int, np.ndarray]
     ambient: np.ndarray
 

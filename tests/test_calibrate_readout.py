@@ -21,20 +21,20 @@ from psvideo.capture import cameras
 from psvideo.cli.app import main
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 LED_HZ = 1013.0
 ROWS, COLS = 400, 64
 LED = Led(rate_hz=LED_HZ, tolerance_ppm=0.0)
 
 
-def texture(rng: np.random.Generator, rows: int, cols: int, strength: float) -> FloatArray:
+def texture(rng: np.random.Generator, rows: int, cols: int, strength: float) -> Doubles:
     """Return a scene whose logarithm is 1/f noise."""
     frequency = np.hypot(np.fft.fftfreq(rows)[:, None], np.fft.rfftfreq(cols)[None])
     frequency[0, 0] = 1
     spectrum = (rng.normal(size=frequency.shape) + 1j * rng.normal(size=frequency.shape)) / frequency
     noise = np.fft.irfft2(spectrum, s=(rows, cols))
-    scene: FloatArray = np.exp(strength * noise / noise.std())
+    scene: Doubles = np.exp(strength * noise / noise.std())
     return scene
 
 
@@ -51,11 +51,11 @@ def film(
     noise: float = 0.02,
     gamma: float = 2.2,
     level: float = 0.7,
-    scene: FloatArray | float = 1.0,
+    scene: Doubles | float = 1.0,
 ) -> NDArray[np.uint8]:
     """Return an 8-bit picture of a blinking LED; ``period`` in rows, below 0 bottom-up; ``exposure`` in periods."""
 
-    def light_until(blinks: FloatArray) -> FloatArray:
+    def light_until(blinks: Doubles) -> Doubles:
         whole = np.floor(blinks)
         return whole * duty + np.minimum(blinks - whole, duty)
 
@@ -205,7 +205,7 @@ def test_the_led_s_clock_has_its_part_in_the_error() -> None:
     assert found.error_s == pytest.approx(np.hypot(found.clock_error_s, found.stripes_error_s))
 
 
-def unlit(rng: np.random.Generator) -> FloatArray:
+def unlit(rng: np.random.Generator) -> Doubles:
     return 100 + rng.normal(size=(300, 64))
 
 
@@ -213,11 +213,11 @@ def one_and_a_half(rng: np.random.Generator) -> NDArray[np.uint8]:
     return film(rng, rows=90, period=60.0)
 
 
-def uneven_pairs(rng: np.random.Generator) -> FloatArray:
+def uneven_pairs(rng: np.random.Generator) -> Doubles:
     return film(rng, period=30.0, phase=0.1) + 0.35 * film(rng, period=60.0, phase=0.4)
 
 
-def two_lamps(rng: np.random.Generator) -> FloatArray:
+def two_lamps(rng: np.random.Generator) -> Doubles:
     return film(rng, period=30.0) + 0.9 * film(rng, period=47.1)
 
 

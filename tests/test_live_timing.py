@@ -15,7 +15,7 @@ from psvideo.live.following.history import timing_of
 from psvideo.live.following.light_names import guess_words, order_of
 from psvideo.live.following.lock import check_followed, frames_to_lock, lock
 from psvideo.live.following.phase_filter import Measured, smoothed
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.timing import Timing
@@ -54,11 +54,11 @@ def shoot(plan: Plan, *, frames: int = FRAMES, clock: TrueClock | None = None, *
     return expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, **options)  # type: ignore[arg-type]
 
 
-def profiles_of(shot: Exposure) -> FloatArray:
+def profiles_of(shot: Exposure) -> Doubles:
     return collect(MemoryFrame(n, image) for n, image in enumerate(shot.frames))[1]
 
 
-def followed(plan: Plan, values: FloatArray) -> Followed:
+def followed(plan: Plan, values: Doubles) -> Followed:
     first = frames_to_lock(plan)
     follower = caught_up(plan, lock(plan, np.arange(first), values[:first]), list(values[:first]))
     states = [(first, follower.state)]
@@ -69,10 +69,10 @@ def followed(plan: Plan, values: FloatArray) -> Followed:
     return Followed(follower=follower, states=states)
 
 
-def apart_rows(one: Timing, start_s: FloatArray, plan: Plan) -> FloatArray:
+def apart_rows(one: Timing, start_s: Doubles, plan: Plan) -> Doubles:
     """Return how far every flash is from the nearest that starts at ``start_s``, in rows."""
     nearest = np.abs(start_s[:, None] - one.start_s).argmin(axis=0)
-    apart: FloatArray = (one.start_s - start_s[nearest]) / plan.camera.row_time_s
+    apart: Doubles = (one.start_s - start_s[nearest]) / plan.camera.row_time_s
     return apart
 
 

@@ -17,6 +17,7 @@ import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.compute.compiled import EXACT
 from psvideo.errors import PsvideoError
+from psvideo.model.arrays import Floats
 from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.irradiance.near_light import near_field, near_vectors
 from psvideo.model.rig import Light, Rig
@@ -30,7 +31,7 @@ from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.loops.near_kernel import place_lights
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
-from psvideo.solve.normals.task import Floats, Near
+from psvideo.solve.normals.task import Near
 from psvideo.solve.normals.trust.judging import Judging
 from psvideo.solve.normals.trust.judging import _typical as typical
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.rows.recipe import FlashRecipe, flash_recipe, frames_of
 from psvideo.model.timing import Flash, Timing
 from psvideo.synth.lamps.emission import Emission
@@ -47,7 +48,7 @@ def timing_of(
     )  # fmt: skip
 
 
-def frames_seen(camera: Camera, timing: Timing, plates: FloatArray, ambient: FloatArray) -> FloatArray:
+def frames_seen(camera: Camera, timing: Timing, plates: Doubles, ambient: Doubles) -> Doubles:
     """What a camera records (frame, row), from the virtual lights' own emission and no code that is under test."""
     emission = Emission(rise_s=timing.rise_s, fall_s=timing.fall_s)
     opens_s = np.arange(FRAMES)[:, None] * PERIOD_S + camera.row_offsets_s()
@@ -58,8 +59,8 @@ def frames_seen(camera: Camera, timing: Timing, plates: FloatArray, ambient: Flo
     return seen
 
 
-def made(recipe: FlashRecipe, frames: FloatArray) -> FloatArray:
-    total: FloatArray = np.sum([c * frames[n] for n, c in zip(recipe.frames, recipe.coefficients, strict=True)], axis=0)
+def made(recipe: FlashRecipe, frames: Doubles) -> Doubles:
+    total: Doubles = np.sum([c * frames[n] for n, c in zip(recipe.frames, recipe.coefficients, strict=True)], axis=0)
     return total
 
 

@@ -13,7 +13,7 @@ from picture_file import read_picture
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import read_plan
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.rows.shutter import row_weights
@@ -49,11 +49,11 @@ def timing_of(plan: Plan, shot: Exposure, **options: str) -> Timing:
     return timing_from_rows(plan, indices, profiles, **options)  # type: ignore[arg-type]
 
 
-def errors_rows(timing: Timing, shot: Exposure) -> FloatArray:
+def errors_rows(timing: Timing, shot: Exposure) -> Doubles:
     """Return by how many rows every flash found is off the true flash nearest to it."""
     true_s = np.array([flash.start_s for flash in shot.flashes])
     nearest = np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)
-    off: FloatArray = (timing.start_s - true_s[nearest]) / abs(timing.row_time_s)
+    off: Doubles = (timing.start_s - true_s[nearest]) / abs(timing.row_time_s)
     return off
 
 

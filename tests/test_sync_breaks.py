@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time
@@ -20,7 +20,7 @@ CLEAN = Noise(full_well_e=1e7, read_e=1.0)
 
 def broken_off(
     plan: Plan, seed: int, *, frames: int, stops: float, begins: float
-) -> tuple[tuple[TrueFlash, ...], FloatArray]:
+) -> tuple[tuple[TrueFlash, ...], Doubles]:
     """Return the flashes that fire, and row means (frame, row), of a strobe that stops and begins again at some times,
     in frames."""
     rng, period_s = np.random.default_rng(seed), plan.camera.frame_period_s

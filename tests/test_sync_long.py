@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
@@ -42,19 +42,19 @@ def drifting(plan: Plan, noise: Noise) -> Exposure:
     return expose(scene, plan, frames=FRAMES, clock=clock, noise=noise, bits=12)
 
 
-def timed(plan: Plan, shot: Exposure, profiles: FloatArray) -> Timing:
+def timed(plan: Plan, shot: Exposure, profiles: Doubles) -> Timing:
     return timing_from_rows(plan, np.arange(FRAMES), profiles)
 
 
-def errors_in_rows(timing: Timing, shot: Exposure, plan: Plan) -> FloatArray:
+def errors_in_rows(timing: Timing, shot: Exposure, plan: Plan) -> Doubles:
     true_s = np.array([flash.start_s for flash in shot.flashes])
     off_s = timing.start_s - true_s[np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)]
-    rows: FloatArray = np.abs(off_s) / plan.camera.row_time_s
+    rows: Doubles = np.abs(off_s) / plan.camera.row_time_s
     return rows
 
 
-def means(shot: Exposure) -> FloatArray:
-    profiles: FloatArray = shot.frames.mean(axis=2, dtype=np.float64)
+def means(shot: Exposure) -> Doubles:
+    profiles: Doubles = shot.frames.mean(axis=2, dtype=np.float64)
     return profiles
 
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.errors import NoStrobeError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Timing
 from psvideo.sync.find import timing_from_rows
@@ -47,14 +47,14 @@ def shot_of(plan: Plan, phase_s: float = PHASE_S, *, frames: int = FRAMES, alike
 
 def with_restart(
     plan: Plan, late_s: float, *, alike: bool = False, cut: int = BREAK
-) -> tuple[tuple[Exposure, Exposure], FloatArray]:
+) -> tuple[tuple[Exposure, Exposure], Doubles]:
     """Return a strobe's shots before and after it waits for some time, and the row means of both in one clip."""
     before, after = shot_of(plan, alike=alike), shot_of(plan, PHASE_S + late_s, alike=alike)
     frames = np.concatenate([before.frames[:cut], after.frames[cut:]])
     return (before, after), frames.mean(axis=2, dtype=np.float64)
 
 
-def rows_of(plan: Plan, profiles: FloatArray) -> Profiles:
+def rows_of(plan: Plan, profiles: Doubles) -> Profiles:
     frames, height = profiles.shape
     return Profiles(
         value=profiles,
@@ -207,7 +207,7 @@ def test_places_between_frames_are_counted_in_ticks(plan: Plan) -> None:
     )
 
 
-def other_picture(kind: str, count: int) -> FloatArray:
+def other_picture(kind: str, count: int) -> Doubles:
     """Return the row means of frames that no strobe lights, shape (frame, row)."""
     rng = np.random.default_rng(2)
     if kind == "noise":

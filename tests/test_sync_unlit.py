@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.sync.find import timing_from_rows
@@ -29,14 +29,14 @@ def shot_of(plan: Plan) -> Exposure:
     return expose(plates, plan, frames=FRAMES, clock=clock, ambient=0.02, noise=Noise(full_well_e=2e5, read_e=5))
 
 
-def profiles_of(shot: Exposure, dark: slice) -> FloatArray:
+def profiles_of(shot: Exposure, dark: slice) -> Doubles:
     """Return the shot's row means with some frames that ambient light alone is in."""
-    profiles: FloatArray = shot.frames.mean(axis=2, dtype=np.float64)
+    profiles: Doubles = shot.frames.mean(axis=2, dtype=np.float64)
     profiles[dark] = profiles.min(axis=0) + 2e-4 * np.random.default_rng(1).random(profiles[dark].shape)
     return profiles
 
 
-def laid_out(plan: Plan, profiles: FloatArray) -> Profiles:
+def laid_out(plan: Plan, profiles: Doubles) -> Profiles:
     return Profiles(
         value=profiles,
         index=np.arange(len(profiles), dtype=np.int64),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 LIT, LEAST_REACHED = 0.08, 5
 """A light reaches a pixel that it gives at least this much of its brightest one; this many (all of four) must."""
@@ -38,8 +38,8 @@ class Strengths:
     """``intensity`` (light, channel), mean over lights 1 in every channel; ``error`` (light,) relative standard errors;
     ``left`` is the share of a pixel's light that stays unexplained (median)."""
 
-    intensity: FloatArray
-    error: FloatArray
+    intensity: Doubles
+    error: Doubles
     left: float
 
 
@@ -48,13 +48,13 @@ class LitPixels:
     """Pixels that lights reach: ``values`` (light, pixel, channel), which of them count, ``used`` (pixel, light), and
     in which ``block`` (pixel,) of the picture they lie."""
 
-    values: FloatArray
+    values: Doubles
     used: NDArray[np.bool_]
     block: NDArray[np.intp]
 
     def fit(
-        self, directions: FloatArray, channel: int | None = None, some: NDArray[np.bool_] | slice = slice(None)
-    ) -> "tuple[FloatArray, float] | None":
+        self, directions: Doubles, channel: int | None = None, some: NDArray[np.bool_] | slice = slice(None)
+    ) -> "tuple[Doubles, float] | None":
         """Return intensities (light,), their mean 1, of a channel or of the mean of all, and the share of light left;
         None where no strengths fit ``some`` of the pixels."""
         light = (self.values.mean(axis=2) if channel is None else self.values[..., channel]).T[some]
@@ -87,7 +87,7 @@ def lit_pixels(pictures: LightPictures) -> LitPixels:
     )
 
 
-def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Strengths:
+def measure_strengths(pictures: LightPictures, directions: Doubles) -> Strengths:
     """Return the lights' intensities from a matte scene; ``directions`` (light, 3) are unit vectors.
 
     Raises PsvideoError with fewer than four lights, too few usable pixels, or a scene that does not show them.
@@ -123,7 +123,7 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
     return Strengths(intensity=np.stack(known, axis=1), error=error, left=whole[1])
 
 
-def _errors(pixels: LitPixels, directions: FloatArray, whole: FloatArray) -> FloatArray:
+def _errors(pixels: LitPixels, directions: Doubles, whole: Doubles) -> Doubles:
     """Return the relative standard errors (light,) of intensities ``whole``: how far they differ between parts of the
     picture, and with directions that are off by DIRECTIONS_DEG."""
     by_parts, rng = _error_by_parts(pixels, directions, whole), np.random.default_rng(0)
@@ -135,7 +135,7 @@ def _errors(pixels: LitPixels, directions: FloatArray, whole: FloatArray) -> Flo
     return np.asarray(np.hypot(by_parts, np.sqrt(squares / TRIALS)), np.float64)
 
 
-def _error_by_parts(pixels: LitPixels, directions: FloatArray, whole: FloatArray) -> FloatArray:
+def _error_by_parts(pixels: LitPixels, directions: Doubles, whole: Doubles) -> Doubles:
     """Return the relative standard error (light,) of intensities ``whole``, by a jackknife over the picture's blocks;
     infinite where there are fewer than two."""
     block = pixels.block
@@ -145,7 +145,7 @@ def _error_by_parts(pixels: LitPixels, directions: FloatArray, whole: FloatArray
     count = len(parts)
     if count < 2:
         return np.full(len(whole), np.inf)
-    error: FloatArray = np.sqrt((count - 1) / count * ((parts / whole - 1) ** 2).sum(axis=0))
+    error: Doubles = np.sqrt((count - 1) / count * ((parts / whole - 1) ** 2).sum(axis=0))
     return error
 
 
@@ -154,12 +154,12 @@ class StrengthsFit:
     """``inverse`` (light,) is one over the strengths, 1 for the median; ``normals`` (point, 3) are unit vectors;
     ``left`` is the typical share of a point's light that stays unexplained."""
 
-    inverse: FloatArray
-    normals: FloatArray
+    inverse: Doubles
+    normals: Doubles
     left: float
 
 
-def fitted(unit: FloatArray, sent: FloatArray, used: NDArray[np.bool_], *, free: bool) -> StrengthsFit | None:
+def fitted(unit: Doubles, sent: Doubles, used: NDArray[np.bool_], *, free: bool) -> StrengthsFit | None:
     """Fit normals, and strengths where they are ``free``, to points of unit light (point, light) under what is ``sent``
     there (point, light, 3), as far as measurements are ``used`` (point, light), with weights that follow what is left
     over. None where no positive strengths fit."""
@@ -179,7 +179,7 @@ def fitted(unit: FloatArray, sent: FloatArray, used: NDArray[np.bool_], *, free:
     return StrengthsFit(inverse=inverse, normals=normals, left=spread * np.sqrt(unit.shape[1]))
 
 
-def _inverse_strengths(unit: FloatArray, weighed: FloatArray, square: FloatArray, weights: FloatArray) -> FloatArray:
+def _inverse_strengths(unit: Doubles, weighed: Doubles, square: Doubles, weights: Doubles) -> Doubles:
     """Return one over the strengths (light,), of which the median is 1: the least eigenvector of what no normals of the
     points explain, in units of how much each light says."""
     told = weighed * unit[..., None]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.falloff import POWERS, Falloff, terms
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.intensity import with_measured
@@ -43,7 +43,7 @@ class FlatLight:
     part (``psvideo.model.irradiance.falloff``), ``left`` what differs beside it in the same way."""
 
     name: str
-    intensity: FloatArray
+    intensity: Doubles
     intensity_error: float
     falloff: float
     coefficients: tuple[float, ...]
@@ -55,7 +55,7 @@ class Target:
     """A white target: its albedo, its unit normal, and the part of the picture it fills (rows and columns)."""
 
     albedo: float
-    normal: FloatArray
+    normal: Doubles
     rows: slice
     cols: slice
 
@@ -82,7 +82,7 @@ def measure_flat_field(
     return found
 
 
-def _refuse_part(blocks: FloatArray, target: Target) -> None:
+def _refuse_part(blocks: Doubles, target: Target) -> None:
     """Raise PsvideoError where the target fills only a part of the picture, or of the box; ``blocks`` (light, row,
     col) are what it shows under every light, 1 in the median."""
     alike = np.exp(np.log(np.maximum(blocks, 1e-3)).mean(axis=0))
@@ -127,7 +127,7 @@ def on_target(
     ground: Ground | None,
     *,
     least_share: float = LEAST_SHARE,
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+) -> tuple[Doubles, NDArray[np.bool_]]:
     """Return what light ``n`` of the pictures sends to a target, (row, col, channel), the same everywhere but for
     falloff that the rig does not explain; and which pixels count, ``least_share`` of them at least.
 
@@ -155,7 +155,7 @@ def on_target(
 
 def _flat(
     light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None
-) -> tuple[FlatLight, FloatArray]:
+) -> tuple[FlatLight, Doubles]:
     """Return a light's strength, and what the target shows in blocks, 1 in the median."""
     flat, usable = on_target(light, n, pictures, target, ground)
     level = np.median(flat[usable], axis=0)
@@ -183,7 +183,7 @@ def _flat(
     return measured, blocks
 
 
-def _in_blocks(grey: FloatArray) -> FloatArray:
+def _in_blocks(grey: Doubles) -> Doubles:
     """Return the medians of blocks of a picture (row, col), NaN where nothing is known."""
     rows, cols = (np.array_split(np.arange(size), min(size, BLOCKS)) for size in grey.shape)
     parts = [[grey[one[0] : one[-1] + 1, other[0] : other[-1] + 1] for other in cols] for one in rows]
@@ -200,7 +200,7 @@ def falloff_of(found: Sequence[FlatLight], target: Target, pictures: LightPictur
     )
 
 
-def _smooth(grey: FloatArray, target: Target, pictures: LightPictures) -> tuple[tuple[float, ...], float]:
+def _smooth(grey: Doubles, target: Target, pictures: LightPictures) -> tuple[tuple[float, ...], float]:
     """Return the polynomial of the logarithm of what a target shows (row, col), NaN where unknown, robustly; and the
     share by which the middle 90 % of the target still differ."""
     step = max(int(np.sqrt(grey.size / MOST_PIXELS)), 1)

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from psvideo.calibrate.cho2020 import LIT
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.choices import Prior
 from psvideo.model.rig import Light, Rig, vector
 
@@ -90,7 +90,7 @@ def _prior(lights: int, wished: Prior | None) -> Prior:
     return chosen
 
 
-def _rig_of(names: Sequence[str], lit: FloatArray) -> Rig:
+def _rig_of(names: Sequence[str], lit: Doubles) -> Rig:
     """Return lights whose vectors (light, 3) are direction times strength, their mean strength 1."""
     lengths = np.linalg.norm(lit, axis=1)
     strengths = lengths / lengths.mean()
@@ -102,7 +102,7 @@ def _rig_of(names: Sequence[str], lit: FloatArray) -> Rig:
     )
 
 
-def _lit_by_all(pictures: LightPictures, grey: FloatArray) -> NDArray[np.bool_]:
+def _lit_by_all(pictures: LightPictures, grey: Doubles) -> NDArray[np.bool_]:
     clipped = pictures.saturated if pictures.saturated.ndim == 3 else pictures.saturated.any(axis=3)
     least, most = grey.min(axis=0), grey.max(axis=0)
     seen: NDArray[np.bool_] = np.all(pictures.seen, axis=0)[:, None]
@@ -116,16 +116,16 @@ def _lit_by_all(pictures: LightPictures, grey: FloatArray) -> NDArray[np.bool_]:
     return mask
 
 
-def _factorised(values: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _factorised(values: Doubles) -> tuple[Doubles, Doubles, float]:
     """Return lights (light, 3) and surface (pixel, 3) up to a matrix, and the share of energy that they explain."""
     ways, sizes, _ = np.linalg.svd(values @ values.T)
     factor = ways[:, :3] * sizes[:3] ** 0.25
-    codes: FloatArray = np.linalg.lstsq(factor, values, rcond=None)[0].T.astype(np.float64)
+    codes: Doubles = np.linalg.lstsq(factor, values, rcond=None)[0].T.astype(np.float64)
     codes /= (scale := float(np.median(np.linalg.norm(codes, axis=1))))
     return factor * scale, codes, float(sizes[:3].sum() / sizes.sum())
 
 
-def _metric(vectors: FloatArray) -> FloatArray:
+def _metric(vectors: Doubles) -> Doubles:
     """Return the symmetric matrix B with ``v B v = 1`` for vectors (n, 3), those that fit best.
 
     Raises PsvideoError where the vectors leave it open: on a cone (lights in a regular ring) or in a plane.
@@ -145,18 +145,18 @@ def _metric(vectors: FloatArray) -> FloatArray:
     return np.array([[a, d, e], [d, b, f], [e, f, c]])
 
 
-def _root(square: FloatArray) -> FloatArray:
+def _root(square: Doubles) -> Doubles:
     sizes, ways = np.linalg.eigh(square)
     if sizes[0] <= 0:
         raise PsvideoError(
             "No lights of equal strength (or no surface of equal albedo) explain these pictures, so directions cannot "
             "be guessed. Try the other `prior`, take out gloss and shadow, or calibrate on a sphere."
         )
-    root: FloatArray = ways * np.sqrt(sizes)
+    root: Doubles = ways * np.sqrt(sizes)
     return root
 
 
-def _upright(surface: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
+def _upright(surface: Doubles, mask: NDArray[np.bool_]) -> Doubles:
     """Return the rotation (or reflection) that makes scaled normals (pixel, 3) a surface that bulges to the camera."""
     turn = _integrable(surface, mask)
     turned = surface @ turn.T
@@ -167,7 +167,7 @@ def _upright(surface: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
     return turn if outward > 0 else np.diag([-1.0, -1.0, 1.0]) @ turn
 
 
-def _integrable(surface: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
+def _integrable(surface: Doubles, mask: NDArray[np.bool_]) -> Doubles:
     """Return the rotation R under which scaled normals c (pixel, 3) belong to a surface.
 
     Of b = R c must hold ``(b x b_x) . x + (b x b_y) . y = 0``, and a rotation of c turns the cross products alike: a
@@ -196,13 +196,13 @@ def _integrable(surface: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
     return turn
 
 
-def _refined(start: FloatArray, form: FloatArray) -> FloatArray:
+def _refined(start: Doubles, form: Doubles) -> Doubles:
     unit = form / np.trace(form)
 
-    def cost(by: FloatArray) -> float:
+    def cost(by: Doubles) -> float:
         rows = (Rotation.from_rotvec(by).as_matrix() @ start)[:2].ravel()
         return float(rows @ unit @ rows)
 
     by = minimize(cost, np.zeros(3), method="BFGS").x  # type: ignore[no-untyped-call]
-    turned: FloatArray = Rotation.from_rotvec(by).as_matrix() @ start
+    turned: Doubles = Rotation.from_rotvec(by).as_matrix() @ start
     return turned

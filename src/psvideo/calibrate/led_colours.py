@@ -9,7 +9,7 @@ import numpy as np
 from psvideo.calibrate.flat_field import Target, on_target
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.colours import CHANNELS, MOST_COLOUR_CONDITION, colour_condition, lamps_of, most_alike
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.intensity import with_measured
@@ -29,8 +29,8 @@ class LedColours:
     """
 
     names: tuple[str, ...]
-    seen: FloatArray
-    error: FloatArray
+    seen: Doubles
+    error: Doubles
     together: tuple[str, ...]
     condition: float
     flashes_s: tuple[float, ...] | None = None
@@ -80,7 +80,7 @@ def with_colours(rig: Rig, found: LedColours) -> Rig:
 
 def _measured(
     light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Doubles, Doubles]:
     flat, usable = on_target(light, n, pictures, target, ground, least_share=LEAST_SHARE)
     level = np.median(flat[usable], axis=0)
     if level.max() <= 0:

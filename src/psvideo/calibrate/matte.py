@@ -17,7 +17,7 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere.outline import Outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Light, Rig
 
 INNER_DEG = 72.0
@@ -47,9 +47,9 @@ class MatteLight:
     """
 
     name: str
-    direction: FloatArray
+    direction: Doubles
     error_deg: float
-    intensity: FloatArray
+    intensity: Doubles
     intensity_error: float
     left: float
     used: float
@@ -60,9 +60,9 @@ class MatteLight:
 class _Sphere:
     """Pixels of the sphere: normals (pixel, 3), which patch each belongs to, values (light, pixel, channel)."""
 
-    normals: FloatArray
+    normals: Doubles
     patch: NDArray[np.intp]
-    values: FloatArray
+    values: Doubles
     usable: NDArray[np.bool_]
 
 
@@ -101,7 +101,7 @@ def _as_light(light: MatteLight) -> Light:
     return Light(name=light.name, direction=(x, y, z), intensity=strengths, error_deg=round(light.error_deg, 3))
 
 
-def sphere_normals(view: SphereView, place: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def sphere_normals(view: SphereView, place: Doubles, points: Doubles) -> tuple[Doubles, Doubles]:
     """Return the sphere's normals (point, 3) where the rays through points (x, y) meet it, and the facing cosines.
 
     The cosine between normal and the ray back is 0 or less where the ray misses.
@@ -111,12 +111,12 @@ def sphere_normals(view: SphereView, place: FloatArray, points: FloatArray) -> t
     along = ((centre - origins) * directions).sum(axis=1)
     gap = radius**2 - ((origins + along[:, None] * directions - centre) ** 2).sum(axis=1)
     met = origins + (along - np.sqrt(np.maximum(gap, 0)))[:, None] * directions
-    normals: FloatArray = (met - centre) / radius
-    facing: FloatArray = np.where(gap > 0, -(normals * directions).sum(axis=1), 0.0)
+    normals: Doubles = (met - centre) / radius
+    facing: Doubles = np.where(gap > 0, -(normals * directions).sum(axis=1), 0.0)
     return normals, facing
 
 
-def _pixels(pictures: LightPictures, view: SphereView, place: FloatArray) -> _Sphere:
+def _pixels(pictures: LightPictures, view: SphereView, place: Doubles) -> _Sphere:
     """Take the sphere's pixels out of the pictures, evenly thinned where they are very many."""
     x, y, radius = place[:3]
     step = max(int(np.ceil(np.sqrt(np.pi * radius**2 / MOST_PIXELS))), 1)
@@ -139,7 +139,7 @@ def _pixels(pictures: LightPictures, view: SphereView, place: FloatArray) -> _Sp
     )
 
 
-def _outlines_off(outline: Outline) -> list[FloatArray]:
+def _outlines_off(outline: Outline) -> list[Doubles]:
     """Return the outline moved by its standard error in the three ways it may be off: x, y and radius together."""
     values, ways = np.linalg.eigh(outline.covariance[:3, :3])
     moves = (ways * np.sqrt(np.maximum(values, 0))).T
@@ -176,15 +176,15 @@ def _light(name: str, n: int, sphere: _Sphere, moved: list[_Sphere]) -> MatteLig
     )
 
 
-def _turned_deg(covariance: FloatArray, direction: FloatArray, length: float) -> float:
+def _turned_deg(covariance: Doubles, direction: Doubles, length: float) -> float:
     """Return the root mean square angle by which a vector of this direction and length is turned."""
     across = np.eye(3) - np.outer(direction, direction)
     return float(np.degrees(np.sqrt(np.trace(across @ covariance @ across)) / length))
 
 
 def _covariances(
-    sphere: _Sphere, n: int, moved: list[_Sphere], lit: NDArray[np.bool_], total: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    sphere: _Sphere, n: int, moved: list[_Sphere], lit: NDArray[np.bool_], total: Doubles
+) -> tuple[Doubles, Doubles]:
     """Return the covariance (3, 3) of a light's direction times its intensity, ``total``: how it changes as patches are
     left out one by one and as only what is well lit counts; and as the outline is moved by its own error."""
     everything = np.ones(len(sphere.normals), np.bool_)
@@ -194,8 +194,8 @@ def _covariances(
     off = [_fitted(one, n, np.ones(len(one.normals), np.bool_))[0].sum(axis=0) for one in moved]
     count = max(len(patches), 1)
     spread = np.array([one - total for one in without])
-    by_parts: FloatArray = (count - 1) / count * spread.T @ spread + np.outer(well_lit - total, well_lit - total)
-    by_outline: FloatArray = np.sum([np.outer(one - total, one - total) for one in off], axis=0)
+    by_parts: Doubles = (count - 1) / count * spread.T @ spread + np.outer(well_lit - total, well_lit - total)
+    by_outline: Doubles = np.sum([np.outer(one - total, one - total) for one in off], axis=0)
     return by_parts, by_outline
 
 
@@ -203,7 +203,7 @@ _OUTLINE_UNSURE = "where the sphere's outline is, is not known well enough to sa
 _CONTRADICTS = "its parts contradict each other: what is inside the outline is no matte sphere of one colour"
 
 
-def _fault(sphere: _Sphere, n: int, lit: NDArray[np.bool_], intensity: FloatArray, left: float) -> str:
+def _fault(sphere: _Sphere, n: int, lit: NDArray[np.bool_], intensity: Doubles, left: float) -> str:
     if intensity.min() <= 0 or lit.sum() < LEAST_PIXELS:
         clipped = 1 - sphere.usable[n].mean()
         why = f"{clipped:.0%} of the sphere is saturated" if clipped > 0.2 else "it hardly lights the sphere"
@@ -218,7 +218,7 @@ def _fault(sphere: _Sphere, n: int, lit: NDArray[np.bool_], intensity: FloatArra
 
 def _fitted(
     sphere: _Sphere, n: int, chosen: NDArray[np.bool_], *, least_cosine: float = LEAST_COSINE
-) -> tuple[FloatArray, float, NDArray[np.bool_]]:
+) -> tuple[Doubles, float, NDArray[np.bool_]]:
     """Return one light's strength times direction per channel (channel, 3), the unexplained share, and what counted.
 
     The brightest half begins; then all that the light reaches well counts, weighed by how well it fits.
@@ -228,7 +228,7 @@ def _fitted(
     usable = sphere.usable[n] & chosen
     if usable.sum() < LEAST_PIXELS:
         return np.zeros((values.shape[1], 3)), 1.0, np.zeros_like(usable)
-    vector: FloatArray = np.zeros(3)
+    vector: Doubles = np.zeros(3)
     lit = usable & (bright > 0.5 * np.quantile(bright[usable], 0.98))
     weight = lit.astype(np.float64)
     for _ in range(ROUNDS):
@@ -249,7 +249,7 @@ def _fitted(
     return np.outer(strengths, direction), left, lit
 
 
-def _solved(normals: FloatArray, values: FloatArray, weight: FloatArray) -> FloatArray:
+def _solved(normals: Doubles, values: Doubles, weight: Doubles) -> Doubles:
     weighted = normals * weight[:, None]
-    vector: FloatArray = np.linalg.lstsq(weighted.T @ normals, weighted.T @ values, rcond=None)[0].astype(np.float64)
+    vector: Doubles = np.linalg.lstsq(weighted.T @ normals, weighted.T @ values, rcond=None)[0].astype(np.float64)
     return vector

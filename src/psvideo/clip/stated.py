@@ -17,7 +17,7 @@ from PIL import ExifTags, Image
 
 from psvideo.clip.transfer import BY_H273, DISPLAYED, find_curve, to_light
 from psvideo.formats.paths import check_file
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.turn import EXIF, UPRIGHT, Turn
 
 LIKE = 0.02
@@ -121,14 +121,14 @@ def _curve(info: dict[Any, Any]) -> tuple[str | None, str]:
     return None, ""
 
 
-def _named(light: FloatArray) -> str:
+def _named(light: Doubles) -> str:
     """Return the known curve that makes this light of SIGNALS, or "unknown"."""
     away = {name: float(np.abs(to_light(find_curve(name), SIGNALS) - light).max()) for name in DISPLAYED[:6]}
     best = min(away, key=lambda name: away[name])
     return best if away[best] < LIKE else "unknown"
 
 
-def _profile_light(profile: bytes) -> FloatArray | None:
+def _profile_light(profile: bytes) -> Doubles | None:
     """Return the light that an ICC profile's curve makes of SIGNALS; None where it has no single curve."""
     with contextlib.suppress(struct.error, ValueError, IndexError):
         tags = io.BytesIO(profile[128:])
@@ -140,7 +140,7 @@ def _profile_light(profile: bytes) -> FloatArray | None:
     return None
 
 
-def _tone(tag: bytes) -> FloatArray | None:
+def _tone(tag: bytes) -> Doubles | None:
     """Return the light of a ``curv`` or ``para`` tag (ICC.1:2010, 10.5 and 10.15)."""
     kind = tag[:4]
     if kind == b"curv":

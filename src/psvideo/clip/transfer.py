@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError, UsageError, nearest
-from psvideo.model.camera import Encoding, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Encoding
 
 STUDIO_CONFIG = "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
 UNKNOWN_COLOUR = "unknown"
@@ -250,7 +251,7 @@ def stops_unused(encoding: Encoding) -> float:
     return max(float(np.log2(to_light(curve, np.ones(1))[0] / curve.peak)), 0.0)
 
 
-def to_light(curve: TransferCurve, signal: FloatArray | NDArray[np.float32]) -> FloatArray:
+def to_light(curve: TransferCurve, signal: Doubles | NDArray[np.float32]) -> Doubles:
     """Return the linear light, on the curve's own scale, that a signal (fraction of the largest code) stands for."""
     if not curve.source:
         return np.array(signal, np.float64)

@@ -15,13 +15,12 @@ import av
 import numpy as np
 from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTrc
 from av.video.stream import VideoStream
-from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
+from psvideo.model.arrays import Pixels
 from psvideo.model.choices import Codec
 
-Pixels = NDArray[np.uint8]
 MOST_RATE = 1_000_000
 CONTAINING = {"movflags": "+faststart", "use_editlist": "0"}
 """The description comes before the pictures, so that browsers begin at once."""

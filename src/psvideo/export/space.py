@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from psvideo.errors import UsageError
 from psvideo.export.usd.pose import Pose, read_pose
 from psvideo.export.usd.usd_camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.choices import CameraTime, SpaceName, YDirection
 
 
@@ -46,8 +46,8 @@ class Space:
 
     name: SpaceName = "camera"
     y: YDirection = "up"
-    camera_to_world: FloatArray | None = None
-    origin: FloatArray | None = None
+    camera_to_world: Doubles | None = None
+    origin: Doubles | None = None
     unit_m: float = 1.0
     up: UpAxis = "y"
     lens: float | None = None
@@ -61,7 +61,7 @@ class Space:
         return replace(self, camera_to_world=pose.rotation, origin=pose.origin)
 
     @property
-    def matrix(self) -> FloatArray:
+    def matrix(self) -> Doubles:
         """The camera-to-world matrix (4, 4), place in the last column; of camera space, the unit matrix."""
         turn = np.eye(3) if self.camera_to_world is None else self.camera_to_world
         origin = np.zeros(3) if self.origin is None else self.origin

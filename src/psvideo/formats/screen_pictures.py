@@ -3,13 +3,11 @@
 from pathlib import Path
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import marked_png, whole_file
+from psvideo.model.arrays import Pixels
 
-Pixels = NDArray[np.uint8]
 WHOLE_COLOUR = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 """Colour as fine as brightness: JPEG usually halves it."""
 

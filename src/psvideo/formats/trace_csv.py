@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import read_text
+from psvideo.model.arrays import Integers
 
 SCHEMA = "psvideo-trace/1"
 COLUMNS = "cycle,line,level"
 HEAD = re.compile(r"# psvideo-trace/(\d+) board=(\S+) hz=([1-9]\d*) wiring=(gated|direct)\Z")
 ROW = re.compile(r"(\d{1,18}),(\d{1,3}|[A-Z]\d{1,2}),([01])\Z")
-
-Cycles = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +36,7 @@ class Trace:
     board: str
     hz: int
     wiring: str
-    edges: Mapping[str, Cycles]
+    edges: Mapping[str, Integers]
 
     def pulses(self, line: int) -> NDArray[np.int64]:
         """Return a light's pulses as cycles (pulse, 2): on from the first to the second; one still on is left out."""

@@ -16,7 +16,8 @@ from psvideo.live.following.lock import LONGEST_S, Lock, frames_to_lock, lock
 from psvideo.live.incoming.ring import Ring, RingFrame, ring_of
 from psvideo.live.showing.newest_round import LiveRounds
 from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_rig, smaller_timing
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.coded import Coded
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.plan import Plan
@@ -100,7 +101,7 @@ class Chain:
     follower: Follower | None = None
     _ring: Ring | None = None
     _rounds: LiveRounds | None = None
-    _pending: deque[tuple[int, FloatArray, FloatArray | None]] = field(default_factory=deque)
+    _pending: deque[tuple[int, Doubles, Doubles | None]] = field(default_factory=deque)
     _idle: threading.Event = field(default_factory=_set)
     _first: int | None = None
     _last: int | None = None
@@ -206,7 +207,7 @@ class Chain:
         most = max(round(LONGEST_S / self.plan.camera.frame_period_s), frames_to_lock(self.plan))
         return self._idle.is_set() and (self._last or 0) - index >= most
 
-    def _follow(self, index: int, mean: FloatArray, doubt: FloatArray | None) -> int:
+    def _follow(self, index: int, mean: Doubles, doubt: Doubles | None) -> int:
         follower = self.follower
         assert follower is not None  # noqa: S101
         extra, before = follower.extra, follower.state
@@ -280,7 +281,7 @@ class Chain:
             elif self._ring is not None:
                 self._ring.frames.clear()
 
-    def _catch_up(self, follower: Follower, later: list[tuple[int, FloatArray, FloatArray | None]]) -> None:
+    def _catch_up(self, follower: Follower, later: list[tuple[int, Doubles, Doubles | None]]) -> None:
         for number, mean, doubt in later:
             follower.add(number, mean, doubt)
         if follower.state == "lost":
@@ -294,7 +295,7 @@ class Chain:
 FIRST = LiveRounds.number
 
 
-def _stacked(doubts: list[FloatArray | None], values: FloatArray) -> FloatArray | None:
+def _stacked(doubts: list[Doubles | None], values: Doubles) -> Doubles | None:
     if all(one is None for one in doubts):
         return None
     return np.stack([np.zeros(values.shape[1]) if one is None else one for one in doubts])

@@ -10,12 +10,9 @@ from fractions import Fraction
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-
-FloatArray = NDArray[np.float64]
-
+from psvideo.model.arrays import Doubles
 
 CfaPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 """The colour filters of the top left 2 x 2 pixels, row by row."""
@@ -86,7 +83,7 @@ class Camera:
             )
         return self.readout_s / self.height_px
 
-    def within_row_s(self) -> FloatArray:
+    def within_row_s(self) -> Doubles:
         """When the sensor's rows open of which a row is the mean, beside that row's own time, shape (rows_each,).
 
         >>> mean = Camera(width_px=2, height_px=3, fps=Fraction(100), exposure_s=0.01, readout_s=0.006, rows_each=2)
@@ -98,7 +95,7 @@ class Camera:
         each = np.arange(self.rows_each, dtype=np.float64) - 0.5 * (self.rows_each - 1)
         return each * (self.row_time_s / self.rows_each)
 
-    def row_offsets_s(self) -> FloatArray:
+    def row_offsets_s(self) -> Doubles:
         """When each row opens after its frame has begun, shape (row,); 0 for the row that comes first.
 
         >>> up = Camera(width_px=2, height_px=3, fps=Fraction(100), exposure_s=0.01, readout_s=-0.003)

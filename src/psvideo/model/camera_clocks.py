@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from psvideo.errors import UsageError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 Numbering = Literal["marker", "given"]
 """How it is known which flashes are the same: by the plan's marker alone, or with when the clips began roughly."""
@@ -42,15 +42,15 @@ class CameraClock:
     shared: int
     error_s: float
 
-    def reference_s(self, camera_s: FloatArray | np.float64) -> FloatArray:
+    def reference_s(self, camera_s: Doubles | np.float64) -> Doubles:
         """Return times on this camera's clock as times on the first camera's, same shape."""
         at_s = np.asarray(camera_s)
-        turned: FloatArray = self.rate_ppm * at_s + 0.5 * self.drift_ppm_per_s * at_s**2
+        turned: Doubles = self.rate_ppm * at_s + 0.5 * self.drift_ppm_per_s * at_s**2
         return self.offset_s + at_s + 1e-6 * turned
 
-    def camera_s(self, reference_s: FloatArray | np.float64) -> FloatArray:
+    def camera_s(self, reference_s: Doubles | np.float64) -> Doubles:
         """Return times on the first camera's clock as times on this camera's: the inverse, same shape."""
-        since_s: FloatArray = np.asarray(reference_s) - self.offset_s
+        since_s: Doubles = np.asarray(reference_s) - self.offset_s
         camera_s = since_s
         for _ in range(STEPS):
             camera_s = since_s - 1e-6 * (self.rate_ppm * camera_s + 0.5 * self.drift_ppm_per_s * camera_s**2)

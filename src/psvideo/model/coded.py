@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Image = NDArray[np.float32]
+from psvideo.model.arrays import Image
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.maximal_length import maximal_length
 
 Mode = Literal["rolling", "half-rate", "synced"]
@@ -52,8 +53,8 @@ class FlashTrain:
     """Consecutive flashes as arrays of shape (flash,): slot in the round's list, start and length in strobe seconds."""
 
     slot: NDArray[np.intp]
-    start_s: FloatArray
-    duration_s: FloatArray
+    start_s: Doubles
+    duration_s: Doubles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,13 +133,13 @@ class Plan:
         return self.cycle_s * min(1.0, (self.dark_code + 1) / len(self.dark_rounds) if self.dark_code else 1.0)
 
     @property
-    def power(self) -> FloatArray:
+    def power(self) -> Doubles:
         """The power matrix of the lit slots, shape (lit slot, light)."""
         rows = [[self.flashes[slot].lights.get(name, 0.0) for name in self.lights] for slot in self.lit_slots]
         return np.array(rows, np.float64).reshape(len(self.lit_slots), len(self.lights))
 
     @cached_property
-    def _cycle(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    def _cycle(self) -> tuple[NDArray[np.intp], Doubles, Doubles]:
         """Slots, starts and lengths of one cycle's flashes: a fit asks for its train some hundred times."""
         slots = np.array(self.cycle_slots, np.intp)
         durations_s = np.array([self.flashes[slot].duration_s for slot in slots], np.float64)
@@ -165,11 +166,11 @@ def reference_duration_s(plan: Plan, light: str) -> float:
     return max(flash.duration_s for flash in plan.flashes if light in flash.lit)
 
 
-def mixing_matrix(plan: Plan) -> FloatArray:
+def mixing_matrix(plan: Plan) -> Doubles:
     """Return how much of each light's full flash every lit slot holds, shape (lit slot, light)."""
     reference_s = np.array([reference_duration_s(plan, light) for light in plan.lights])
     duration_s = np.array([plan.flashes[slot].duration_s for slot in plan.lit_slots])
-    matrix: FloatArray = plan.power * duration_s[:, None] / reference_s
+    matrix: Doubles = plan.power * duration_s[:, None] / reference_s
     return matrix
 
 

@@ -10,7 +10,7 @@ from dataclasses import KW_ONLY, dataclass, replace
 import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError, check_kind, nearest
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.units import counted
 
 Vector = tuple[float, float, float]
@@ -18,7 +18,7 @@ LEAST_LIGHTS = 3
 """Fewer lights give no normals."""
 
 
-def vector(values: Sequence[float] | FloatArray) -> Vector:
+def vector(values: Sequence[float] | Doubles) -> Vector:
     """Return three numbers as records hold them."""
     return float(values[0]), float(values[1]), float(values[2])
 
@@ -29,7 +29,7 @@ ROUNDED = 1e-9
 """Vectors whose length is off by more are made unit ones."""
 
 
-def three_numbers(name: str, given: object, expected: str) -> FloatArray:
+def three_numbers(name: str, given: object, expected: str) -> Doubles:
     """Return a parameter as three finite numbers, shape (3,); raises UsageError where it is anything else."""
     try:
         numbers = np.asarray(given, np.float64)
@@ -175,7 +175,7 @@ def check_rig(rig: object) -> None:
     check_kind("rig", rig, Rig, "a Rig: ps.read_rig(path) reads one, ps.Rig(lights=[...]) holds Lights")
 
 
-def directions(lights: Sequence[Light]) -> FloatArray:
+def directions(lights: Sequence[Light]) -> Doubles:
     """Return the unit directions of distant lights, shape (light, 3); raises PsvideoError where a light is near."""
     near = [light.name for light in lights if light.direction is None]
     if near:
@@ -186,7 +186,7 @@ def directions(lights: Sequence[Light]) -> FloatArray:
     return np.array([light.direction for light in lights], np.float64)
 
 
-def intensities(lights: Sequence[Light], channels: int) -> FloatArray:
+def intensities(lights: Sequence[Light], channels: int) -> Doubles:
     """Return the lights' intensities, shape (light, channel); one number stands for all channels.
 
     Raises PsvideoError where a light has another count of channels than the pictures.

@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.plan import HasLights, Plan
 from psvideo.model.rows.ripple import Ripple
 from psvideo.model.rows.shutter import Pulse
@@ -115,12 +116,12 @@ class Timing:
         return Pulse(rise_s=self.rise_s, fall_s=self.fall_s)
 
     @cached_property
-    def start_s(self) -> FloatArray:
+    def start_s(self) -> Doubles:
         """When every flash starts, shape (flash,). Kept, for two hours have 200,000 flashes; not to be written to."""
         return _kept([flash.start_s for flash in self.flashes])
 
     @cached_property
-    def duration_s(self) -> FloatArray:
+    def duration_s(self) -> Doubles:
         """How long every flash lasts on the camera's clock, shape (flash,). Not to be written to."""
         return _kept([flash.duration_s for flash in self.flashes])
 
@@ -130,7 +131,7 @@ class Timing:
         return float(np.min(self.start_s[1:] - (self.start_s + self.duration_s)[:-1], initial=np.inf))
 
 
-def _kept(values: list[float]) -> FloatArray:
+def _kept(values: list[float]) -> Doubles:
     kept = np.array(values, np.float64)
     kept.flags.writeable = False
     return kept

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from psvideo.model.arrays import Doubles
 
 WIDE, TALL = 560, 170
 LEFT, RIGHT, TOP, BELOW = 46, 96, 10, 26
@@ -16,22 +17,20 @@ STOP_WIDE, STOP_TALL = 300, 130
 SHOWN_STOPS = 10
 """Darker light is drawn in the first bin."""
 
-Values = NDArray[np.float64]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ChartLine:
     """One series: ``y`` (point,), NaN where it is not known."""
 
     name: str
-    y: Values
+    y: Doubles
 
 
 @dataclass(frozen=True, kw_only=True)
 class Axes:
     """Where a chart's numbers lie, and what they are of."""
 
-    x: Values
+    x: Doubles
     unit: str
     low: float
     high: float
@@ -66,7 +65,7 @@ def line_chart(axes: Axes, lines: Sequence[ChartLine]) -> str:
     return _svg(WIDE, TALL, axes.label, "".join(parts))
 
 
-def _decimated(x: Values, y: Values) -> tuple[Values, Values, Values]:
+def _decimated(x: Doubles, y: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return at most MOST_POINTS moments, and the least and greatest value at each; unknown values are left out."""
     known = np.isfinite(y)
     x, y = x[known], y[known]
@@ -77,7 +76,7 @@ def _decimated(x: Values, y: Values) -> tuple[Values, Values, Values]:
     return np.array([x[part].mean() for part in parts]), low, high
 
 
-def _path(across: Values, down: Values) -> str:
+def _path(across: Doubles, down: Doubles) -> str:
     return "M" + " L".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, down, strict=True))
 
 
@@ -109,7 +108,7 @@ def _names(ends: list[tuple[float, int, str]], right: int) -> list[str]:
     return parts
 
 
-def stops_chart(shares: Values, name: str, *, stops: int) -> str:
+def stops_chart(shares: Doubles, name: str, *, stops: int) -> str:
     """Return a histogram of light in stops below saturation; the last of ``shares`` (bin,) is what is clipped."""
     hidden = (stops - SHOWN_STOPS) * (len(shares) - 1) // stops
     inner, clipped, stops = shares[hidden:-1].copy(), float(shares[-1]), SHOWN_STOPS

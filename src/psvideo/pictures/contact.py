@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Pixels = NDArray[np.uint8]
+from psvideo.model.arrays import Pixels
 
 BACKGROUND = 24
 INK = (226, 226, 226)

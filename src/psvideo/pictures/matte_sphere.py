@@ -8,7 +8,8 @@ import numpy as np
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.matte import MatteLight, sphere_normals
 from psvideo.calibrate.sphere.outline import Outline
-from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
+from psvideo.model.arrays import Pixels
+from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.on_screen import srgb
 
 TILE_PX = 150

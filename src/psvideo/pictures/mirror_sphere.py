@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting
-from psvideo.model.camera import FloatArray
-from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
+from psvideo.model.arrays import Doubles, Pixels
+from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.on_screen import srgb
 
 WIDTH_PX = 1200
@@ -53,7 +53,7 @@ def _key(sighting: Sighting) -> str:
     )
 
 
-def _direction(direction: FloatArray | None) -> str:
+def _direction(direction: Doubles | None) -> str:
     return "" if direction is None else "(" + ", ".join(f"{value:+.2f}" for value in direction) + ")"
 
 
@@ -66,7 +66,7 @@ def _shown(picture: NDArray[np.float32]) -> Pixels:
 def _drawn(sighting: Sighting, labels: dict[str, str]) -> Pixels:
     corner, canvas, scale = _cut_out(sighting)
 
-    def at(point: FloatArray) -> tuple[int, int]:
+    def at(point: Doubles) -> tuple[int, int]:
         x, y = (np.asarray(point) - corner + 0.5) * scale
         return round(float(x)), round(float(y))
 
@@ -88,7 +88,7 @@ def _drawn(sighting: Sighting, labels: dict[str, str]) -> Pixels:
     return canvas
 
 
-def _cut_out(sighting: Sighting) -> tuple[FloatArray, Pixels, float]:
+def _cut_out(sighting: Sighting) -> tuple[Doubles, Pixels, float]:
     """Return the sphere cut out with a margin: its top left corner (x, y), the pixels, and how much they grew."""
     x, y, radius = sighting.outline.place[:3]
     rows, cols = sighting.picture.shape

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
 from psvideo.compute.spilled import let_go
+from psvideo.model.arrays import Image, Pixels
 from psvideo.model.srgb import srgb_share
 
-Image = NDArray[np.float32]
-Pixels = NDArray[np.uint8]
 BAND_ROWS = 256
 """About this many rows are averaged at a time."""
 

@@ -5,10 +5,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import UsageError, check_kind, nearest
+from psvideo.model.arrays import Pixels
 from psvideo.model.quantities import QUANTITIES, Quantity
 from psvideo.pictures.on_screen import exposure_for, normal_colours, srgb, three_channels
 
-Pixels = NDArray[np.uint8]
 RANGE_PERCENT = (2, 98)
 """What false colours span where nothing else says so: noise at both ends is cut."""
 

@@ -3,14 +3,12 @@
 from numbers import Real
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.errors import UsageError, check_kind
+from psvideo.model.arrays import Image
 from psvideo.model.rig import Vector, three_numbers
 from psvideo.model.surface import Surface, check_surface
 from psvideo.pictures.on_screen import three_channels
-
-Image = NDArray[np.float32]
 
 
 def relight(

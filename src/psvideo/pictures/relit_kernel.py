@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded
-
-Halves = NDArray[np.float16]
-Codes = NDArray[np.uint16]
-Floats = NDArray[np.float32]
+from psvideo.model.arrays import Codes16, Floats, Halves
 
 
 def relit(normals: tuple[Halves, ...], albedo: tuple[Halves, ...], light: NDArray[np.float32], factor: int) -> Halves:
@@ -35,13 +32,21 @@ def shown_by(table: NDArray[np.uint8], picture: Halves) -> NDArray[np.uint8]:
     return shown
 
 
-def _bits(plane: Halves) -> Codes:
+def _bits(plane: Halves) -> Codes16:
     return np.ascontiguousarray(plane).view(np.uint16)
 
 
 @FUSED.kept
 def _relit(
-    xs: Codes, ys: Codes, zs: Codes, reds: Codes, greens: Codes, blues: Codes, light: Any, factor: int, out: Codes
+    xs: Codes16,
+    ys: Codes16,
+    zs: Codes16,
+    reds: Codes16,
+    greens: Codes16,
+    blues: Codes16,
+    light: Any,
+    factor: int,
+    out: Codes16,
 ) -> None:
     share = np.float32(1.0) / np.float32(factor * factor)
     cols = out.shape[1] * factor
@@ -62,18 +67,18 @@ def _relit(
 
 
 @FUSED.kept
-def _look_up(table: NDArray[np.uint8], codes: Codes, out: NDArray[np.uint8]) -> None:
+def _look_up(table: NDArray[np.uint8], codes: Codes16, out: NDArray[np.uint8]) -> None:
     for place in range(codes.shape[0]):
         out[place] = table[np.uintp(codes[place])]
 
 
 @FUSED.inlined
-def _face(xs: Codes, ys: Codes, zs: Codes, x: np.float32, y: np.float32, z: np.float32, facing: Floats) -> None:
+def _face(xs: Codes16, ys: Codes16, zs: Codes16, x: np.float32, y: np.float32, z: np.float32, facing: Floats) -> None:
     for col in range(facing.shape[0]):  # loops over few arrays each become vectors
         facing[col] = max(decoded(xs[col]) * x + decoded(ys[col]) * y + decoded(zs[col]) * z, np.float32(0))
 
 
 @FUSED.inlined
-def _add(albedo: Codes, facing: Floats, total: Floats) -> None:
+def _add(albedo: Codes16, facing: Floats, total: Floats) -> None:
     for col in range(facing.shape[0]):
         total[col] += decoded(albedo[col]) * facing[col]

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Pixels
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.pictures.contact import BACKGROUND, FAINT_INK, GAP_PX, INK, Pixels, Strip, Tile, sheet, write_line
+from psvideo.pictures.contact import BACKGROUND, FAINT_INK, GAP_PX, INK, Strip, Tile, sheet, write_line
 from psvideo.sync.rowfit.profiles import residuals_of
 
 MOST_FRAMES = 120
@@ -23,7 +23,7 @@ RESIDUAL_GAIN = 10.0
 LEFT_OVER = {"brighter than the fit": (255, 60, 60), "darker than the fit": (60, 60, 255)}
 
 
-def timing_picture(plan: Plan, timing: Timing, indices: NDArray[np.int64], profiles: FloatArray) -> Pixels:
+def timing_picture(plan: Plan, timing: Timing, indices: NDArray[np.int64], profiles: Doubles) -> Pixels:
     """Return 8-bit pixels (row, col, 3): four strips for eyes, with axes and a legend.
 
     ``indices`` (frame,) are the frames' true places in time, ``profiles`` (frame, row) their row means.
@@ -107,13 +107,13 @@ def _scaled(picture: NDArray[np.uint8]) -> Pixels:
     return np.asarray(cv2.resize(picture, (WIDE_PX, TALL_PX), interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
-def _grey(values: FloatArray, white: float) -> Pixels:
+def _grey(values: Doubles, white: float) -> Pixels:
     """Return the profiles (frame, row) as a picture, time to the right, rows downwards."""
     level = np.clip(values.T / white, 0, 1) ** (1 / 2.2)
     return _scaled(np.repeat((255 * level).astype(np.uint8)[..., None], 3, axis=2))
 
 
-def _signed(rest: FloatArray, white: float) -> Pixels:
+def _signed(rest: Doubles, white: float) -> Pixels:
     """Return residuals as red (too bright) and blue (too dark) on grey."""
     level = np.clip(RESIDUAL_GAIN * rest.T / white, -1, 1)
     red, blue = np.clip(level, 0, 1), np.clip(-level, 0, 1)
@@ -155,7 +155,7 @@ def _unit_s(timing: Timing) -> float:
     return float(10.0 ** np.ceil(np.log10(max(float(np.abs(stray_s).max()), 1e-8))) / 2)
 
 
-def _stray_s(timing: Timing) -> FloatArray:
+def _stray_s(timing: Timing) -> Doubles:
     """Return every flash's distance from the straight line through all that share its slot, shape (flash,)."""
     stray_s = np.zeros(len(timing.flashes))
     slots = np.array([flash.slot for flash in timing.flashes])

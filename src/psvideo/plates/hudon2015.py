@@ -9,8 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.coded import Image, LinearFrame
+from psvideo.model.arrays import Doubles, Image
+from psvideo.model.camera import Camera
+from psvideo.model.coded import LinearFrame
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate
@@ -45,14 +46,14 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
             yield Plate(flash=flash, picture=mixture_of(image), shares=shares, middles_s=middles_s[None], seen=seen)
 
 
-def luminance_energy(image: Image) -> FloatArray:
+def luminance_energy(image: Image) -> Doubles:
     """Return the sum of the luminance of every row, shape (row,) (eq. 12)."""
     luminance = image @ REC709_LUMINANCE if image.ndim == 3 else image
-    energy: FloatArray = luminance.sum(axis=1, dtype=np.float64)
+    energy: Doubles = luminance.sum(axis=1, dtype=np.float64)
     return energy
 
 
-def _darkest_around(energy: FloatArray, expected: float) -> int:
+def _darkest_around(energy: Doubles, expected: float) -> int:
     """Return the row of least energy within a hundredth of the height around the expected one."""
     reach = max(len(energy) // 100, 1)
     low = int(np.clip(round(expected) - reach, 0, len(energy) - 1))

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Doubles, Image
 from psvideo.plates.mixing.mixture import Mixture
 
 
@@ -29,7 +28,7 @@ class LightPlate:
     seen: NDArray[np.bool_]
     saturation: float = 1.0
     unmixed: bool = False
-    shown_s: FloatArray | None = None
+    shown_s: Doubles | None = None
     sideways: bool = False
 
     @property
@@ -43,7 +42,7 @@ class LightPlate:
         return self.picture.shape
 
     @property
-    def flashed_s(self) -> FloatArray:
+    def flashed_s(self) -> Doubles:
         """The instant that every row shows, shape (row,), or every pixel, (row, col), where the picture was turned."""
         return np.full(self.shape[0], self.time_s) if self.shown_s is None else self.shown_s
 

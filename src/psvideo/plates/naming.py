@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Take
 from psvideo.errors import PsvideoError
+from psvideo.model.arrays import Image
 from psvideo.model.first_light import TOGETHER, check_first_light, first_lit, is_called
 from psvideo.model.marker import alike_turns
 from psvideo.model.plan import HasLights
@@ -23,7 +24,7 @@ from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.split import Plate
-from psvideo.sync.order_by_rig import Image, RigTurn, named_by_turn, order_by_rig, why_undecided
+from psvideo.sync.order_by_rig import RigTurn, named_by_turn, order_by_rig, why_undecided
 
 PLACES = 3
 """Cycles that are looked at, spread over the clip."""

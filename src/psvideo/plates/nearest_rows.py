@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles, Flags
+from psvideo.model.camera import Camera
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 
@@ -22,8 +23,6 @@ LATER, MOST_LATER = 2, 8
 start, where none did."""
 BLIND = 1e-3
 """Share of the frame period for which rows must be blind to be worth the wait."""
-
-Flags = NDArray[np.bool_]
 
 
 def has_blind_time(camera: Camera) -> bool:
@@ -127,5 +126,5 @@ def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
         return plate
     image = np.array(plate.image)
     image[rows] = other.image[rows]
-    shown_s: FloatArray = np.where(rows, other.flashed_s, plate.flashed_s)
+    shown_s: Doubles = np.where(rows, other.flashed_s, plate.flashed_s)
     return replace(plate, picture=mixture_of(image), seen=plate.rows_seen | rows, shown_s=shown_s)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
 from psvideo.plates.align.velocity.followed import Followed
@@ -65,7 +65,7 @@ class Round:
         return float(np.mean([plate.time_s for plate in self.plates]))
 
     @property
-    def age_s(self) -> FloatArray:
+    def age_s(self) -> Doubles:
         """How far from the instant, before or after, the farthest of the flashes is that a row shows, shape (row,), or
         that a pixel shows, (row, col), where pictures were turned."""
         away_s = [np.abs(plate.flashed_s - self.time_s) for plate in self.plates]

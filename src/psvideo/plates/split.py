@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.coded import Coded, CodedFrame, Image
+from psvideo.model.arrays import Doubles, Image
+from psvideo.model.camera import Camera
+from psvideo.model.coded import Coded, CodedFrame
 from psvideo.model.rows.recipe import flash_recipe, frames_of
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.mixing.mixture import Mixture
@@ -30,8 +31,8 @@ class Plate:
 
     flash: Flash
     picture: Mixture
-    shares: FloatArray
-    middles_s: FloatArray
+    shares: Doubles
+    middles_s: Doubles
     seen: NDArray[np.bool_]
 
     @property
@@ -45,9 +46,9 @@ class Plate:
         return self.flash.start_s + self.flash.duration_s / 2
 
     @property
-    def exposures(self) -> FloatArray:
+    def exposures(self) -> Doubles:
         """How many exposures' worth of ambient light the image holds, shape (row,)."""
-        total: FloatArray = self.shares.sum(axis=0)
+        total: Doubles = self.shares.sum(axis=0)
         return total
 
 
@@ -116,7 +117,7 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Cod
     )
 
 
-def _opens_s(camera: Camera, frames: Sequence[int]) -> FloatArray:
+def _opens_s(camera: Camera, frames: Sequence[int]) -> Doubles:
     """Return when each row of each frame begins to expose, shape (frame, row)."""
-    opens_s: FloatArray = np.array(frames)[:, None] * camera.frame_period_s + camera.row_offsets_s()
+    opens_s: Doubles = np.array(frames)[:, None] * camera.frame_period_s + camera.row_offsets_s()
     return opens_s

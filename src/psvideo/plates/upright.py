@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.turn import Turn
 from psvideo.plates.align.packed import packed
 from psvideo.plates.ambient.ambient_regression import Separated
@@ -44,7 +44,7 @@ def _seen(plate: LightPlate, turn: Turn) -> NDArray[np.bool_]:
     return plate.seen[:: -1 if turn.rows_flipped else 1]
 
 
-def _shown_s(plate: LightPlate, turn: Turn) -> FloatArray | None:
+def _shown_s(plate: LightPlate, turn: Turn) -> Doubles | None:
     """Return the instants that the turned plate's rows show, or its pixels where the sensor's rows are columns now."""
     if plate.shown_s is None:
         return None

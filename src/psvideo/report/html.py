@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from psvideo.model.arrays import Pixels
 from psvideo.pictures.charts import stops_chart
 from psvideo.pictures.on_screen import normal_colours
 from psvideo.report.judgement import Judgement, gravest_first, usable
@@ -18,7 +18,6 @@ from psvideo.report.over_time import over_time
 from psvideo.report.run_report import RunReport
 from psvideo.report.style import STYLE
 
-Pixels = NDArray[np.uint8]
 MOST_ROUNDS = 20
 MARKS = {"good": "✓", "doubtful": "△", "bad": "✕", "unknown": "–"}
 JPEG_QUALITY = 90

@@ -7,18 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psvideo.errors import PsvideoError, UsageError, check_kind
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.rig import UNIT_TOLERANCE, Light
 
-Images = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 MOST_CLIPPED = 0.5
 """Where half of the pixels are clipped under every light, the scale is wrong rather than the exposure."""
 
 
 def checked_images(
     images: ArrayLike | Sequence[ArrayLike], *, black_level: float | None, white_level: float | None
-) -> Images:
+) -> Floats:
     """Return images as float32 (light, row, col) or (light, row, col, 3), 1.0 = white level where that is given."""
     for name, level in (("black_level", black_level), ("white_level", white_level)):
         if level is not None:
@@ -90,7 +88,7 @@ def _check_shape(stack: NDArray[np.generic]) -> None:
         raise UsageError(f"`images` have shape {stack.shape}: there are no pixels. {expected}.")
 
 
-def _linear(codes: NDArray[np.generic], black_level: float | None, white_level: float | None) -> Images:
+def _linear(codes: NDArray[np.generic], black_level: float | None, white_level: float | None) -> Floats:
     if white_level is None:
         raise UsageError(
             f"`images` are integer codes ({codes.dtype}), and nothing says what they mean. Expected floats in linear "
@@ -114,7 +112,7 @@ def _refuse_missing(stack: NDArray[np.generic]) -> None:
         )
 
 
-def checked_lights(directions: ArrayLike, intensities: ArrayLike | None, stack: Images) -> tuple[Light, ...]:
+def checked_lights(directions: ArrayLike, intensities: ArrayLike | None, stack: Floats) -> tuple[Light, ...]:
     """Return lights named by their place from unit vectors (light, 3) and strengths, one for each image."""
     vectors = _floats("lights", directions)
     if vectors.ndim != 2 or vectors.shape[-1] != 3:
@@ -147,7 +145,7 @@ def checked_lights(directions: ArrayLike, intensities: ArrayLike | None, stack: 
     )
 
 
-def check_lit(stack: Images) -> None:
+def check_lit(stack: Floats) -> None:
     """Raise UsageError where no image holds any light."""
     brightest = float(stack.max())
     if brightest <= 0:
@@ -157,7 +155,7 @@ def check_lit(stack: Images) -> None:
         )
 
 
-def check_count(lights: int, stack: Images) -> None:
+def check_count(lights: int, stack: Floats) -> None:
     """Raise UsageError where there is not one light for each image."""
     if lights == len(stack):
         return
@@ -170,7 +168,7 @@ def check_count(lights: int, stack: Images) -> None:
     )
 
 
-def _strengths(intensities: ArrayLike | None, stack: Images) -> FloatArray:
+def _strengths(intensities: ArrayLike | None, stack: Floats) -> Doubles:
     if intensities is None:
         return np.ones((len(stack), 1))
     strengths = _floats("intensities", intensities)
@@ -182,7 +180,7 @@ def _strengths(intensities: ArrayLike | None, stack: Images) -> FloatArray:
     return strengths.reshape(len(stack), -1)
 
 
-def _floats(name: str, given: ArrayLike) -> FloatArray:
+def _floats(name: str, given: ArrayLike) -> Doubles:
     try:
         values = np.asarray(given, np.float64)
     except (TypeError, ValueError):
@@ -208,7 +206,7 @@ def checked_mask(mask: ArrayLike, shape: tuple[int, int]) -> Mask:
     return where
 
 
-def checked_saturation(saturation: float, stack: Images, mask: Mask | None) -> np.float32:
+def checked_saturation(saturation: float, stack: Floats, mask: Mask | None) -> np.float32:
     """Return the unit in which images are solved, so that samples are clipped from 1.0 on."""
     check_kind("saturation", saturation, Real, "the value from which on samples are clipped, a number")
     if not saturation > 0:

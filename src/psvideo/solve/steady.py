@@ -16,14 +16,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from psvideo.compute.spilled import in_file, let_go
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Bytes, Flags
 from psvideo.model.surface import Surface
 from psvideo.plates.sequence import POOLED_ROUNDS
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.surface_bits import bits, stored
-from psvideo.solve.normals.task import Bytes
 from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
 
-Flags = NDArray[np.bool_]
 SHOWN = np.ones((1, 1), np.bool_)
 MOST_SINCE = 255
 EACH_SLOT = 256

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
+from psvideo.model.arrays import Bytes, Floats
 from psvideo.model.surface import MEASURED
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
-from psvideo.solve.normals.task import Bytes, Floats, Samples
+from psvideo.solve.normals.task import Samples
 
 SEGMENT = 64
 """Pixels of a row that are pooled together, or not."""

@@ -1,16 +1,14 @@
 """The compiled loop of sweeping: how well every distance explains what near lights show in a point."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.near_light import LEAST_COSINE
 
 ROUNDS = 4
 """Of weighing down what does not fit."""
 LEAST_LIT, TINY = 4, 1e-12
-
-Doubles = NDArray[np.float64]
 
 
 @FUSED.kept

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Floats
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
 from psvideo.solve.falloff_costs import falloff_costs
@@ -23,19 +24,17 @@ APART = 1.04
 AROUND = 5
 """What single pixels say is averaged over a disc of this many, less at its rim."""
 
-Plane = NDArray[np.float32]
 
-
-def sides_of(deep: Plane) -> tuple[Plane, Plane]:
+def sides_of(deep: Floats) -> tuple[Floats, Floats]:
     """Return the least and the greatest distance around every coarse point."""
     square = np.ones((REACH, REACH), np.uint8)
     return np.asarray(cv2.erode(deep, square), np.float32), np.asarray(cv2.dilate(deep, square), np.float32)
 
 
 def outlined(
-    ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], sides: tuple[Plane, Plane], *, step: int,
+    ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], sides: tuple[Floats, Floats], *, step: int,
     noise: float,
-) -> tuple[Plane, Plane]:  # fmt: skip
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Return the depth (row, col) of every ``step``-th row and column, and how unsure its logarithm is.
 
     Of the two ``sides`` that is taken which explains the ``light`` (row, col, light) of the point and its neighbours

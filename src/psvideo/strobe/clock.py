@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 MOST_READINGS = 256
 """More are thinned: of those in one stretch of time the one with the shortest round trip is kept."""
@@ -71,7 +71,7 @@ def fit_clock(readings: Sequence[ClockQuery], *, tick_ps: int) -> ClockFit | Non
     )
 
 
-def _gain(ticks: FloatArray, asked_s: FloatArray, answered_s: FloatArray, best: float) -> tuple[float, float, float]:
+def _gain(ticks: Doubles, asked_s: Doubles, answered_s: Doubles, best: float) -> tuple[float, float, float]:
     """Return the gain within its bounds, and the bounds: what the queries, two by two, allow."""
     first, second = np.triu_indices(len(ticks), 1)
     apart = ticks[second] - ticks[first]

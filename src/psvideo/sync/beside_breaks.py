@@ -8,8 +8,8 @@ breaks, which fit somewhere by chance, or of those in which no flash lights anyt
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Integers
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses
 
 BESIDE = 2
@@ -21,7 +21,7 @@ FEW = 6
 """Fewer frames than this between two breaks fit by chance."""
 
 
-def doubted_places(found: ClipFit, numbered: NDArray[np.int64]) -> IntArray:
+def doubted_places(found: ClipFit, numbered: NDArray[np.int64]) -> Integers:
     """Return the places in time, ascending, of frames in which a fit's flashes are not to be trusted.
 
     ``numbered`` (frame,) are the places of all of the clip's frames by their numbers.
@@ -40,5 +40,5 @@ def doubted_places(found: ClipFit, numbered: NDArray[np.int64]) -> IntArray:
     inner = np.diff(breaks) < FEW
     for first, end in zip(breaks[:-1][inner].tolist(), breaks[1:][inner].tolist(), strict=True):
         near[first:end] = True
-    doubted: IntArray = np.unique(np.concatenate([places[lit[near]], places[dark]]))
+    doubted: Integers = np.unique(np.concatenate([places[lit[near]], places[dark]]))
     return doubted

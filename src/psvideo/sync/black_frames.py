@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash
@@ -18,7 +18,6 @@ from psvideo.sync.flashes_seen import fitted_camera
 from psvideo.sync.rowfit import row_model
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, compiled_rows, predictions
-from psvideo.sync.rowfit.row_model import IntArray
 
 ROWS = 60
 BLACK, LIT = 0.1, 0.1
@@ -32,7 +31,7 @@ MOST_NAMED = 8
 """Frames that a sentence names."""
 
 
-def black_frames(plan: Plan, found: ClipFit) -> IntArray:
+def black_frames(plan: Plan, found: ClipFit) -> Integers:
     """Return the places in time of the frames that are black though flashes lit them, shape (black frame,)."""
     rest = found.fit.rest
     rows = replace(found.rows.one_window(), doubt=None, restless=None)
@@ -63,7 +62,7 @@ def _is_black(plan: Plan, rows: Profiles, found: ClipFit, frame: int) -> bool:
     return left[0] < CLEARER * min(left[1:], default=np.inf)
 
 
-def _without(rows: Profiles, found: ClipFit, flashes: row_model.Flashes, one: int, light: FloatArray) -> FloatArray:
+def _without(rows: Profiles, found: ClipFit, flashes: row_model.Flashes, one: int, light: Doubles) -> Doubles:
     unknown = flashes.unknown.copy()
     unknown[one] = 0
     made = np.empty_like(rows.value)
@@ -72,7 +71,7 @@ def _without(rows: Profiles, found: ClipFit, flashes: row_model.Flashes, one: in
     return made
 
 
-def marked(plan: Plan, found: ClipFit, flashes: Sequence[Flash], spoilt: IntArray) -> tuple[Flash, ...]:
+def marked(plan: Plan, found: ClipFit, flashes: Sequence[Flash], spoilt: Integers) -> tuple[Flash, ...]:
     """Return flashes with those marked as incomplete of which spoilt frames, by their places in time, saw any."""
     if not len(spoilt):
         return tuple(flashes)
@@ -84,7 +83,7 @@ def marked(plan: Plan, found: ClipFit, flashes: Sequence[Flash], spoilt: IntArra
     )
 
 
-def remarks_on_black(found: ClipFit, black: IntArray, numbers: NDArray[np.int64]) -> Iterator[str]:
+def remarks_on_black(found: ClipFit, black: Integers, numbers: NDArray[np.int64]) -> Iterator[str]:
     """Say which frames are black, by their ``numbers``."""
     if not len(black):
         return

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import NoStrobeError, PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.first_light import TOGETHER, check_first_light, first_lit, is_called
 from psvideo.model.plan import HasLights, Plan
 from psvideo.model.timing import DroppedFrames, Order, Timing
@@ -47,7 +47,7 @@ ADVICE = (
 def timing_from_rows(
     plan: Plan,
     indices: NDArray[np.int64],
-    profiles: FloatArray,
+    profiles: Doubles,
     *,
     clip: str = "clip",
     first_light: str | None = None,
@@ -182,7 +182,7 @@ class FoundStrobe:
 def find_strobe(
     plan: Plan,
     indices: NDArray[np.int64],
-    profiles: FloatArray,
+    profiles: Doubles,
     *,
     clip: str = "clip",
     first_light: str | None = None,
@@ -204,7 +204,7 @@ def find_strobe(
 def _to_fit(
     plan: Plan,
     indices: NDArray[np.int64],
-    profiles: FloatArray,
+    profiles: Doubles,
     doubt: NDArray[np.floating] | None,
     *,
     clip: str,
@@ -240,7 +240,7 @@ def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
 
 
 def _as_profiles(
-    plan: Plan, indices: NDArray[np.int64], values: FloatArray, doubt: NDArray[np.floating] | None
+    plan: Plan, indices: NDArray[np.int64], values: Doubles, doubt: NDArray[np.floating] | None
 ) -> Profiles:
     """Lay out the profiles for fitting, rows in the order in which they open as far as that is known."""
     height = values.shape[1]

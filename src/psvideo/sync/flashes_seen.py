@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.first_light import first_lit, is_called
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
@@ -75,7 +76,7 @@ def flashes_seen(
     *,
     trusted: tuple[int, int],
     unsure: NDArray[np.int64] | Sequence[int] = (),
-    late: Callable[[FloatArray], FloatArray] = np.zeros_like,
+    late: Callable[[Doubles], Doubles] = np.zeros_like,
 ) -> tuple[Flash, ...]:
     """Return the flashes of which the frames from the first to the last of a ``span`` saw any, in order.
 

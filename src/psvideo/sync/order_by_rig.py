@@ -12,17 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Image
 from psvideo.model.irradiance.light_field import Points, light_vectors
 from psvideo.model.marker import NOT_FIRING, turned_slot, turns_in_the_dark
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.rows.clipping import SATURATED, SMALL_PLATE_MARGIN
 from psvideo.model.timing import Timing
-
-Image = NDArray[np.float32]
 
 MEASURED_ERROR_DEG, DISTANT_ERROR_DEG, NEAR_ERROR_DEG = 1.5, 3.0, 5.0
 """What lights are taken to be wrong by at least, directions and strengths (1 degree for 1.7 %) together: where the rig
@@ -56,7 +53,7 @@ class RigTurn:
 class _Samples:
     """Pixels under every lit slot, one channel of one pixel each: ``light`` (sample, lit slot), and where they lie."""
 
-    light: FloatArray
+    light: Doubles
     points: Points
 
 
@@ -187,7 +184,7 @@ def _samples(pictures: list[Image]) -> _Samples:
     return _Samples(light=stack[:, row, col, channel].T, points=points)
 
 
-def _fit(turn: int, vectors: FloatArray, light: FloatArray) -> _Fit:
+def _fit(turn: int, vectors: Doubles, light: Doubles) -> _Fit:
     """Find the smallest change of the lights, common to all samples, that explains the picture under a turn.
 
     ``vectors`` (sample, slot, 3) are the lights, ``light`` (sample, slot) what was seen.

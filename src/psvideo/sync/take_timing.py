@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from psvideo.clip import Take, check_take, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.sync.find import timing_from_rows
@@ -23,7 +23,7 @@ class TakeProfiles:
     """
 
     index: NDArray[np.int64]
-    value: FloatArray
+    value: Doubles
     doubt: NDArray[np.float32] | None = None
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.marker import alike_turns, turned_slot
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
@@ -94,7 +94,7 @@ def _aligned(plan: Plan, rows: Profiles, beat: Beat) -> Beat:
     return refined_beat(plan, rows, beat, steps=4)
 
 
-def _beaten(gain: FloatArray) -> bool:
+def _beaten(gain: Doubles) -> bool:
     """Return whether a rival's losses exceed the best's (frame,) clearly."""
     total = float(gain.sum())
     error = float(np.sqrt((gain**2).sum())) + 1e-12

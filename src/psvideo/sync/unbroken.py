@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock, train_between
 from psvideo.sync.rowfit.fit import ClipFit
@@ -34,7 +34,7 @@ def unbroken(plan: Plan, whole: ClipFit, parts: Sequence[tuple[slice, ClipFit]])
     return bool(max(np.abs(late_s).max(), moved_s.max()) < APART * plan.shortest_flash_s)
 
 
-def _apart_s(plan: Plan, whole: ClipFit, cut: slice, found: ClipFit) -> FloatArray:
+def _apart_s(plan: Plan, whole: ClipFit, cut: slice, found: ClipFit) -> Doubles:
     """Return by how much the whole clip's flashes come later than a part's, each against the nearest one, and by how
     much its cycles begin later, shape (place, 2)."""
     at = np.unique(np.linspace(0, cut.stop - cut.start - 1, PLACES).astype(int))
@@ -48,7 +48,7 @@ def _apart_s(plan: Plan, whole: ClipFit, cut: slice, found: ClipFit) -> FloatArr
     return np.array(apart)
 
 
-def _since(plan: Plan, clock: FoundClock, at_s: float) -> tuple[FloatArray, float]:
+def _since(plan: Plan, clock: FoundClock, at_s: float) -> tuple[Doubles, float]:
     """Return when the flashes within a cycle of a time start, counted from it, and when the cycle nearest to it."""
     start_s = train_between(plan, clock, at_s, at_s).start_s - at_s
     begin_s = start_s[:: len(plan.cycle_slots)]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import Pulse
 from psvideo.model.timing import Flash
@@ -21,7 +21,6 @@ from psvideo.model.units import counted
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import row_noise
-from psvideo.sync.rowfit.row_model import IntArray
 
 ROWS = 60
 PART_FRAMES = 512
@@ -52,8 +51,8 @@ MOST_NAMED = 8
 class _Levels:
     """What flashes give, ``value`` (flash,), with its standard errors; NaN where too little was seen of one."""
 
-    value: FloatArray
-    error: FloatArray
+    value: Doubles
+    error: Doubles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +119,7 @@ def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[NDArray[
     return off, np.isfinite(share) & (around > GOES_ON)
 
 
-def _usual(level: FloatArray) -> float:
+def _usual(level: Doubles) -> float:
     """Return what a light's flashes give that fire, most of which may be missing."""
     known = level[np.isfinite(level)]
     if not len(known):
@@ -128,7 +127,7 @@ def _usual(level: FloatArray) -> float:
     return float(np.median(known[known >= GOES_ON * np.percentile(known, 95)], keepdims=True)[0])
 
 
-def _around(share: FloatArray, slot: IntArray) -> FloatArray:
+def _around(share: Doubles, slot: Integers) -> Doubles:
     """Return what flashes of other lights give just before and after each one, shape (flash,)."""
     beside = [n for n in range(-AROUND, AROUND + 1) if n]
     at = np.arange(len(share))[:, None] + np.array(beside)
@@ -139,15 +138,15 @@ def _around(share: FloatArray, slot: IntArray) -> FloatArray:
         others &= slot[at] != slot[:, None]
     near = np.where(others, share[at], np.nan)
     near[~others.any(axis=1)] = 0.0
-    found: FloatArray = np.maximum(np.nanmedian(near, axis=1), 1e-9)
+    found: Doubles = np.maximum(np.nanmedian(near, axis=1), 1e-9)
     return found
 
 
-def _first_frame(found: ClipFit, start_s: FloatArray) -> IntArray:
+def _first_frame(found: ClipFit, start_s: Doubles) -> Integers:
     """Return the first place in time of which any row sees any of each flash, shape (flash,)."""
     beat, rows = found.fit.beat, found.rows
     spread_s = rows.place.max() * beat.row_time_s + beat.exposure_s
-    first: IntArray = np.floor((start_s - spread_s) / rows.period_s).astype(np.int64) + 1
+    first: Integers = np.floor((start_s - spread_s) / rows.period_s).astype(np.int64) + 1
     return first
 
 
@@ -178,20 +177,20 @@ class _Part:
     """Frames ``value`` (frame, row) and the flashes in them: of each its light ``unknown`` (flash,), the frames ``at``
     (flash, touched) that may have seen it, and what share of it their rows saw, ``seen`` (flash, touched, row)."""
 
-    value: FloatArray
-    at: IntArray
-    seen: FloatArray
-    unknown: IntArray
+    value: Doubles
+    at: Integers
+    seen: Doubles
+    unknown: Integers
 
     @classmethod
     def of(
         cls,
         found: ClipFit,
         rows: Profiles,
-        first: IntArray,
-        start_s: FloatArray,
-        duration_s: FloatArray,
-        unknown: IntArray,
+        first: Integers,
+        start_s: Doubles,
+        duration_s: Doubles,
+        unknown: Integers,
     ) -> "_Part":
         """Lay out flashes that start and last for some seconds, each first seen in a frame at a place in time."""
         beat = found.fit.beat
@@ -203,7 +202,7 @@ class _Part:
         seen *= (rows.index[at] == places)[:, :, None]
         return cls(value=rows.value, at=at, seen=seen, unknown=unknown)
 
-    def levels(self, lights: int) -> tuple[FloatArray, FloatArray]:
+    def levels(self, lights: int) -> tuple[Doubles, Doubles]:
         """Return what every flash gives, as a mean over rows, and its standard error, both of shape (flash,)."""
         gain = np.ones(len(self.unknown))
         for turn in range(TURNS):
@@ -217,10 +216,10 @@ class _Part:
         size = np.sqrt((light[:, 1:] ** 2).mean(axis=0))[self.unknown]
         whole = (light[:, 1:] ** 2).sum(axis=0)[self.unknown]
         noise = np.sqrt((own**2 * row_noise(rest) ** 2).sum(axis=(1, 2))) / np.maximum(power, 1e-30)
-        level: FloatArray = np.where(power > SEEN * whole, gain * size, np.nan)
+        level: Doubles = np.where(power > SEEN * whole, gain * size, np.nan)
         return level, noise * size
 
-    def _design(self, gain: FloatArray, lights: int) -> FloatArray:
+    def _design(self, gain: Doubles, lights: int) -> Doubles:
         """Return what rows saw of ambient light and of every light, shape (frame, row, 1 + light)."""
         design = np.zeros((*self.value.shape, 1 + lights))
         design[:, :, 0] = 1.0
@@ -229,13 +228,13 @@ class _Part:
         return design
 
 
-def _solved(design: FloatArray, value: FloatArray) -> FloatArray:
+def _solved(design: Doubles, value: Doubles) -> Doubles:
     """Return the brightnesses (row, unknown) that explain rows best."""
     normal = np.einsum("fru,frv->ruv", design, design, optimize=True)
     size = np.einsum("ruu->ru", normal)
     normal += 1e-6 * np.maximum(size, size.max())[:, :, None] * np.eye(design.shape[2])
     right = np.einsum("fru,fr->ru", design, value, optimize=True)
-    found: FloatArray = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+    found: Doubles = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
     return found
 
 

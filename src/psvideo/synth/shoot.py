@@ -15,10 +15,11 @@ from psvideo.formats.plan_toml import PLAN_FILE, format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.formats.whole_folders import whole_folder
+from psvideo.model.arrays import Image
 from psvideo.synth.camera.encode import codes_of, mosaic, sensor_noise
 from psvideo.synth.camera.frames import SUFFIX, write_frame
 from psvideo.synth.camera.noise import frame_rng
-from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames
+from psvideo.synth.camera.sensor import MainsSwing, expose_frames
 from psvideo.synth.lamps.traced import TraceOptions, traced_light
 from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, true_flashes
 from psvideo.synth.scene import read_scene

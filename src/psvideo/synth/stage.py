@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from psvideo.model.arrays import Image
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
-from psvideo.synth.camera.sensor import Image
 from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.lamps.true_flashes import TrueFlash, row_opens_s
 from psvideo.synth.scene import Scene

@@ -5,19 +5,17 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.formats.exr_files import write_exr
+from psvideo.model.arrays import Floats
 from psvideo.model.plan import Plan
 from psvideo.synth.lamps.traced import TracedLight
 from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.subject.render import Hits
 
-Plane = NDArray[np.float32]
 
-
-def write_picture(path: Path, image: Plane) -> None:
+def write_picture(path: Path, image: Floats) -> None:
     """Write an image (row, col) or (row, col, 3) as 32-bit EXR."""
     planes = {"Y": image} if image.ndim == 2 else dict(zip("RGB", np.moveaxis(image, -1, 0), strict=True))
     write_exr(path, planes, half=False)
@@ -30,24 +28,24 @@ def write_true_surface(folder: Path, hits: Hits, channels: int, name: str = "") 
         write_picture(folder / key / f"{name}.exr" if name else folder / f"{key}.exr", image)
 
 
-def true_normals(hits: Hits) -> Plane:
+def true_normals(hits: Hits) -> Floats:
     """Return unit normals (row, col, 3), 0 where nothing is hit; a pixel's rays are averaged and made unit again."""
     mean = hits.image(hits.normal).astype(np.float64)
     length = np.linalg.norm(mean, axis=-1, keepdims=True)
     return np.asarray(np.divide(mean, length, out=np.zeros_like(mean), where=length > 0), np.float32)
 
 
-def true_albedo(hits: Hits, channels: int) -> Plane:
+def true_albedo(hits: Hits, channels: int) -> Floats:
     """Return the albedo, (row, col, 3), or its mean over the colours, (row, col), for a grey camera."""
     return as_seen(hits.image(hits.albedo), channels)
 
 
-def true_mask(hits: Hits) -> Plane:
+def true_mask(hits: Hits) -> Floats:
     """Return the share of each pixel's rays that hit anything, (row, col), 0 to 1."""
     return hits.image(np.ones(len(hits.sample), np.float32))
 
 
-def as_seen(image: Plane, channels: int) -> Plane:
+def as_seen(image: Floats, channels: int) -> Floats:
     """Return a rendered picture with the camera's channels: a grey camera sees the mean of the colours."""
     return image if channels else np.asarray(image.mean(axis=-1), np.float32)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.calibrate.sphere.outline import Outline
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 SURE_ERRORS = 4.0
 """Excess of the rays' scatter over their errors from which on a light counts as near."""
@@ -25,14 +25,12 @@ class Ray:
     """A mirrored ray: where it starts on the sphere, its unit direction to the light, and that one's standard error
     (root mean square angle). ``start`` is in metres where the sphere's radius is known, else in the view's units."""
 
-    start: FloatArray
-    direction: FloatArray
+    start: Doubles
+    direction: Doubles
     error_deg: float
 
 
-def mirrored_ray(
-    outline: Outline, highlight: FloatArray, error_px: float, *, radius_m: float | None = None
-) -> Ray | None:
+def mirrored_ray(outline: Outline, highlight: Doubles, error_px: float, *, radius_m: float | None = None) -> Ray | None:
     """Return the ray from a sphere to the light whose highlight (x, y) is given; None where that lies outside."""
     hit = outline.view.mirrored(outline.place, highlight)
     if hit is None:
@@ -55,7 +53,7 @@ def mirrored_ray(
     return Ray(start=start * unit, direction=direction, error_deg=float(np.degrees(np.sqrt(variance))))
 
 
-def mean_direction(rays: Sequence[Ray]) -> tuple[FloatArray, float, float]:
+def mean_direction(rays: Sequence[Ray]) -> tuple[Doubles, float, float]:
     """Return the mean direction (3,) of rays, its standard error in degrees, and their scatter over their own errors.
 
     Where rays scatter more than their errors say, the error grows by as much.
@@ -73,8 +71,8 @@ def mean_direction(rays: Sequence[Ray]) -> tuple[FloatArray, float, float]:
 class Crossing:
     """Where rays nearly meet: the point in metres, its covariance (3, 3), and the rays' misses over their errors."""
 
-    position_m: FloatArray
-    covariance: FloatArray
+    position_m: Doubles
+    covariance: Doubles
     excess: float
 
     @property
@@ -110,5 +108,5 @@ def crossing(rays: Sequence[Ray]) -> Crossing | None:
     miss = np.einsum("nij,nj->ni", across, point - starts)
     chi = float(((miss**2).sum(axis=1) / spread**2).sum())
     excess = float(np.sqrt(chi / (2 * len(rays) - 3)))
-    covariance: FloatArray = (np.linalg.inv(matrix) * max(excess, 1.0) ** 2).astype(np.float64)
+    covariance: Doubles = (np.linalg.inv(matrix) * max(excess, 1.0) ** 2).astype(np.float64)
     return Crossing(position_m=point, covariance=covariance, excess=excess)

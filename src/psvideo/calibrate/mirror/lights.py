@@ -15,7 +15,7 @@ from psvideo.calibrate.mirror.measured import MeasuredLight, MirrorCalibration
 from psvideo.calibrate.mirror.mirror_doubts import doubts_of
 from psvideo.calibrate.mirror.sighting import Highlight, Sighting, cut_differently, lacking_for_positions
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 DISAGREE_DEG = 10.0
 """Directions from two spheres that differ by more, and do not meet in a point, cannot both be right."""
@@ -67,7 +67,7 @@ def _measured(name: str, sightings: Sequence[Sighting], radius_m: float | None) 
     return _joined(name, rays, can_cross=can_cross, lacking=lacking_for_positions(sightings))
 
 
-def _ray(sighting: Sighting, place: FloatArray, one: Highlight, radius_m: float | None) -> Ray | None:
+def _ray(sighting: Sighting, place: Doubles, one: Highlight, radius_m: float | None) -> Ray | None:
     return mirrored_ray(sighting.outline, place, one.error_px, radius_m=radius_m)
 
 
@@ -122,7 +122,7 @@ def _apart(spread_deg: float, lacking: str) -> str:
     )
 
 
-def _sideways_deg(meeting: Crossing, towards: FloatArray, distance_m: float) -> float:
+def _sideways_deg(meeting: Crossing, towards: Doubles, distance_m: float) -> float:
     """Return the angle that a position's error makes as seen from the spheres."""
     across = np.eye(3) - np.outer(towards, towards)
     return float(np.degrees(np.sqrt(np.trace(across @ meeting.covariance @ across)) / distance_m))

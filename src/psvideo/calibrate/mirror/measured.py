@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from psvideo.calibrate.mirror.law import Ray
 from psvideo.calibrate.mirror.sighting import Sighting
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Light, Rig
 
 
@@ -17,9 +17,9 @@ class MeasuredLight:
 
     name: str
     rays: tuple[Ray, ...] = ()
-    direction: FloatArray | None = None
+    direction: Doubles | None = None
     error_deg: float = 0.0
-    position_m: FloatArray | None = None
+    position_m: Doubles | None = None
     position_error_m: float = 0.0
     fault: str = ""
 

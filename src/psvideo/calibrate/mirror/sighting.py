@@ -11,10 +11,9 @@ from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
 from psvideo.calibrate.mirror.spots import Spot
 from psvideo.calibrate.sphere.marked import held_against_picture
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
-from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 
 MOST_CUT = 0.15
 """Share of the outline that may lie outside the picture."""
@@ -24,7 +23,7 @@ LEAST_RADIUS_PX = 15.0
 class SphereNotFoundError(PsvideoError):
     """No usable sphere in the pictures; ``picture`` (row, col), linear, shows where it was looked for."""
 
-    def __init__(self, message: str, picture: Grey) -> None:
+    def __init__(self, message: str, picture: Floats) -> None:
         """Keep the picture beside the message."""
         super().__init__(message)
         self.picture = picture
@@ -38,7 +37,7 @@ class Highlight:
     """
 
     light: str
-    place: FloatArray | None
+    place: Doubles | None
     error_px: float = 0.0
     radius_px: float = 0.0
     clipped: bool = False
@@ -59,7 +58,7 @@ class Sighting:
     where: str
     outline: Outline
     highlights: tuple[Highlight, ...]
-    picture: Grey
+    picture: Floats
     sets: int
     moved_px: float = 0.0
     doubt: str = ""
@@ -92,9 +91,9 @@ def sight_spheres(
     """
     outlines: list[Outline] = []
     doubts: list[str] = []
-    fits: list[list[FloatArray]] = []
+    fits: list[list[Doubles]] = []
     found: list[list[list[FoundHighlight]]] = []
-    shown: Grey | None = None
+    shown: Floats | None = None
     for count, pictures in enumerate(sets, start=1):
         brightest = pictures.grey.max(axis=0)
         if shown is None:
@@ -153,7 +152,7 @@ def _not_found(where: str, found: int, wanted: int) -> str:
     )
 
 
-def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
+def _refuse_cut(outline: Outline, where: str, shown: Floats) -> None:
     rows, cols = shown.shape
     x, y, radius = outline.place[:3]
     if radius < LEAST_RADIUS_PX:
@@ -174,7 +173,7 @@ def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
 
 
 def _sighting(
-    where: str, outline: Outline, places: FloatArray, seen: Sequence[Sequence[FoundHighlight]], picture: Grey
+    where: str, outline: Outline, places: Doubles, seen: Sequence[Sequence[FoundHighlight]], picture: Floats
 ) -> Sighting:
     moved = float(np.sqrt(places[:, :2].var(axis=0).sum())) if len(places) > 2 else 0.0
     if len(places) > 1 and not outline.given:

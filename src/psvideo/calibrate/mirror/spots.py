@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 LEVELS = (0.1, 0.2, 0.35, 0.5)
 CLIPPED_LEVELS = (0.8, 0.9, 0.98)
@@ -41,7 +41,7 @@ SPOT_ERROR_SHARE = 0.04
 class Spot:
     """A bright spot: its place (x, y) and standard error in pixels, area in pixels, and why it was not chosen."""
 
-    place: FloatArray
+    place: Doubles
     error_px: float
     area_px: float
     peak: float
@@ -118,7 +118,7 @@ def _largest(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(labels == 1 + int(np.argmax(boxes[1:, cv2.CC_STAT_AREA])), np.bool_)
 
 
-def _drawn_out(weight: FloatArray, x: FloatArray, y: FloatArray) -> float:
+def _drawn_out(weight: Doubles, x: Doubles, y: Doubles) -> float:
     """Return how many times longer than wide a spot is, by its second moments."""
     total = weight.sum()
     moments = np.array([[(weight * a * b).sum() / total for a in (x, y)] for b in (x, y)]) + np.eye(2) / 12

@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere.outline import GIVEN_ERROR_PX, Outline, apart, find_outlines, outline_near
 from psvideo.calibrate.sphere.rim_model import Surface
-from psvideo.calibrate.sphere.round_things import Grey
+from psvideo.model.arrays import Floats
 
 CLEARLY = 3.0
 """A marked outline contradicts the picture's own where they lie apart by this many times both standard errors."""
@@ -24,7 +24,7 @@ def held_against_picture(
     pictures: LightPictures,
     marked: Outline,
     *,
-    room: Grey | None = None,
+    room: Floats | None = None,
     surface: Surface = "mirror",
     others: Sequence[Outline] = (),
 ) -> tuple[Outline, str]:

@@ -13,9 +13,9 @@ import numpy as np
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere.rim_fit import Rim, RoughOutline, fit_rim, follow_rim, seek_rim
 from psvideo.calibrate.sphere.rim_model import Surface
-from psvideo.calibrate.sphere.round_things import Grey, round_things
+from psvideo.calibrate.sphere.round_things import round_things
 from psvideo.calibrate.sphere.sphere_view import SphereView
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.model.channels import mean_of_channels
 
 GIVEN_ERROR_PX = 0.5
@@ -41,9 +41,9 @@ class Outline:
     standard deviation of those edges' blur. ``given``: a person marked it."""
 
     view: SphereView
-    place: FloatArray
-    covariance: FloatArray
-    points: FloatArray
+    place: Doubles
+    covariance: Doubles
+    points: Doubles
     coverage: float
     blur_px: float
     given: bool = False
@@ -81,7 +81,7 @@ def given_outline(view: SphereView, circle: tuple[float, float, float]) -> Outli
     )
 
 
-def rim_pictures(pictures: LightPictures, room: Grey | None = None) -> list[Grey]:
+def rim_pictures(pictures: LightPictures, room: Floats | None = None) -> list[Floats]:
     """Return the pictures (row, col) in which a rim may show: under lights, ambient and room light."""
     grey = pictures.grey
     groups = np.array_split(np.arange(len(grey)), min(len(grey), MOST_PICTURES))
@@ -94,7 +94,12 @@ def rim_pictures(pictures: LightPictures, room: Grey | None = None) -> list[Grey
 
 
 def find_outlines(
-    pictures: LightPictures, view: SphereView, *, count: int = 1, room: Grey | None = None, surface: Surface = "mirror"
+    pictures: LightPictures,
+    view: SphereView,
+    *,
+    count: int = 1,
+    room: Floats | None = None,
+    surface: Surface = "mirror",
 ) -> list[Outline]:
     """Return up to ``count`` spheres' outlines, those that the rim speaks for most first, none over another.
 
@@ -115,9 +120,9 @@ def find_outlines(
 def outline_near(
     pictures: LightPictures,
     view: SphereView,
-    place: FloatArray,
+    place: Doubles,
     *,
-    room: Grey | None = None,
+    room: Floats | None = None,
     surface: Surface = "mirror",
 ) -> Outline | None:
     """Return the outline within about a tenth of its radius of an expected one (5,); None where none is sure.
@@ -130,19 +135,19 @@ def outline_near(
     return _outline(view, fit) if fit is not None and _sure(fit) else None
 
 
-def _telling(pictures: LightPictures, shown: list[Grey]) -> list[Grey]:
+def _telling(pictures: LightPictures, shown: list[Floats]) -> list[Floats]:
     """Return the pictures in which an outline is looked for first, of those in which a rim may show."""
     lit = pictures.grey
     return [lit.mean(axis=0), lit.max(axis=0), *shown[min(len(lit), MOST_PICTURES) :]]
 
 
-def follow_outline(pictures: LightPictures, outline: Outline) -> FloatArray:
+def follow_outline(pictures: LightPictures, outline: Outline) -> Doubles:
     """Return an outline's place (5,) in other pictures of the scene; where too little of it shows, the place it had."""
     place = follow_rim(rim_pictures(pictures), outline.view, outline.place)
     return outline.place if place is None else place
 
 
-def _guesses(seen: Sequence[Grey], view: SphereView, surface: Surface) -> list[RoughOutline]:
+def _guesses(seen: Sequence[Floats], view: SphereView, surface: Surface) -> list[RoughOutline]:
     """Return roughly the outlines of round things."""
     guesses: list[RoughOutline] = []
     for picture in seen:
@@ -154,7 +159,7 @@ def _guesses(seen: Sequence[Grey], view: SphereView, surface: Surface) -> list[R
     return guesses
 
 
-def _bettered(guess: RoughOutline, seen: Sequence[Grey], view: SphereView, surface: Surface) -> RoughOutline:
+def _bettered(guess: RoughOutline, seen: Sequence[Floats], view: SphereView, surface: Surface) -> RoughOutline:
     """Return the best of a guess and of what is found from beside it: part of a rim may have drawn it away."""
     if guess.coverage >= SURE_COVERAGE:
         return guess
@@ -169,10 +174,10 @@ def _sure(fit: Rim) -> bool:
     return fit.coverage >= LEAST_COVERAGE and fit.evidence >= LEAST_EVIDENCE
 
 
-def _logarithm(picture: Grey) -> Grey:
+def _logarithm(picture: Floats) -> Floats:
     """Return a picture in which a faint outline before black cloth weighs as much as one before a lit wall."""
     floor = max(0.25 * float(np.percentile(picture, 50)), 2e-4)
-    logarithm: Grey = np.log(np.maximum(picture, 0) + np.float32(floor)).astype(np.float32)
+    logarithm: Floats = np.log(np.maximum(picture, 0) + np.float32(floor)).astype(np.float32)
     return logarithm
 
 
@@ -187,6 +192,6 @@ def _outline(view: SphereView, fit: Rim) -> Outline:
     )
 
 
-def apart(one: FloatArray, other: FloatArray) -> bool:
+def apart(one: Doubles, other: Doubles) -> bool:
     """Return whether two outlines (5,) are those of two things."""
     return float(np.hypot(*(one[:2] - other[:2]))) > 0.8 * float(one[2] + other[2])

@@ -17,9 +17,8 @@ from scipy.stats.qmc import Sobol
 
 from psvideo.calibrate.sphere.rim_model import Surface
 from psvideo.calibrate.sphere.rim_spokes import Spokes, agreeing, looked_up, spokes_of, widened
-from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import SphereView
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 
 USUAL_STRETCH = 0.005
 """How far from a circle an outline is expected to be where perspective is unknown (a sphere 8 degrees off the axis)."""
@@ -51,9 +50,9 @@ class Rim:
     """An outline (5,) with covariance (5, 5); the spokes' points that agree (point, 2), their share of all spokes;
     ``blur_px`` is the standard deviation of the edge's blur."""
 
-    place: FloatArray
-    covariance: FloatArray
-    points: FloatArray
+    place: Doubles
+    covariance: Doubles
+    points: Doubles
     coverage: float
     evidence: float
     blur_px: float
@@ -64,13 +63,13 @@ class RoughOutline:
     """Roughly an outline (5,), the share of spokes that agree with it, and how much likelier they make it than chance
     (natural logarithm)."""
 
-    place: FloatArray
+    place: Doubles
     coverage: float
     evidence: float
 
 
 def seek_rim(
-    pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
+    pictures: Sequence[Floats], view: SphereView, around: Doubles, *, surface: Surface = "mirror"
 ) -> RoughOutline | None:
     """Return roughly the outline near an expected one (5,), from few spokes; None where none is near it."""
     place = around
@@ -87,7 +86,7 @@ def seek_rim(
 
 
 def fit_rim(
-    pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
+    pictures: Sequence[Floats], view: SphereView, around: Doubles, *, surface: Surface = "mirror"
 ) -> Rim | None:
     """Return the outline within a few pixels of an expected one (5,); None where it is not there."""
     spokes = spokes_of(pictures, view, around, surface, _fine_px(around))
@@ -104,7 +103,7 @@ def fit_rim(
     return _measured(pictures, view, spokes, place, surface) if _sensible(place, around) else None
 
 
-def follow_rim(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
+def follow_rim(pictures: Sequence[Floats], view: SphereView, around: Doubles) -> Doubles | None:
     """Return where a mirror's outline (5,), known from other pictures, is in these; None where too little shows."""
     for mirrored in (False, True):
         spokes = spokes_of(pictures, view, around, "mirror", _fine_px(around), mirrored=mirrored)
@@ -115,11 +114,11 @@ def follow_rim(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -
     return place if _sensible(place, around) and share >= FOLLOWED else None
 
 
-def _in_a_room(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
+def _in_a_room(pictures: Sequence[Floats], view: SphereView, around: Doubles) -> Doubles | None:
     """Return roughly the outline of a mirror near an expected one where the room is mirrored within its rim."""
     share, least_px, largest_px = WIDE
     most_px = float(np.ceil(np.clip(share * around[2], least_px, largest_px)))
-    found: list[tuple[float, FloatArray]] = []
+    found: list[tuple[float, Doubles]] = []
     for larger in LARGER:
         place = around * np.array([1, 1, larger, 1, 1])
         for _ in range(2):
@@ -131,21 +130,21 @@ def _in_a_room(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -
     return max(found, key=lambda one: one[0])[1] if found else None
 
 
-def _unusual(place: FloatArray) -> float:
+def _unusual(place: Doubles) -> float:
     """Return how unlikely an outline's stretch is by itself (natural logarithm)."""
     stretch = place[3:] / USUAL_STRETCH
     return float(0.5 * (stretch @ stretch))
 
 
-def _fine_px(around: FloatArray) -> float:
+def _fine_px(around: Doubles) -> float:
     return float(np.ceil(max(FINE[0] * around[2], FINE[1])))
 
 
-def _sensible(place: FloatArray, around: FloatArray) -> bool:
+def _sensible(place: Doubles, around: Doubles) -> bool:
     return bool(place[2] > 3 and np.abs(place - around)[:3].max() < 0.25 * around[2])
 
 
-def _likeliest(spokes: Spokes, free: int, *, coarse: bool = True) -> FloatArray:
+def _likeliest(spokes: Spokes, free: int, *, coarse: bool = True) -> Doubles:
     """Return the outline at which the spokes' odds are highest, looked for from coarse to fine."""
     scale = np.array([1, 1, 1, 2e-3, 2e-3])[:free]
     found = np.zeros(free)
@@ -153,7 +152,7 @@ def _likeliest(spokes: Spokes, free: int, *, coarse: bool = True) -> FloatArray:
         odds = widened(spokes.odds, width_px)
         first, exact = max(width_px / 3, 0.3), max(width_px / 50, 2e-3)
 
-        def unlikely(moved: FloatArray, odds: FloatArray = odds) -> float:
+        def unlikely(moved: Doubles, odds: Doubles = odds) -> float:
             step = moved * scale
             place = spokes.around.copy()
             place[:free] += step
@@ -165,7 +164,7 @@ def _likeliest(spokes: Spokes, free: int, *, coarse: bool = True) -> FloatArray:
     return np.concatenate([spokes.around[:free] + found * scale, spokes.around[free:]])
 
 
-def _measured(pictures: Sequence[Grey], view: SphereView, spokes: Spokes, place: FloatArray, surface: Surface) -> Rim:
+def _measured(pictures: Sequence[Floats], view: SphereView, spokes: Spokes, place: Doubles, surface: Surface) -> Rim:
     """Return an outline with what agrees with it and its uncertainty."""
     free = view.unknowns
     agree, evidence = agreeing(spokes, place, free)
@@ -184,7 +183,7 @@ def _measured(pictures: Sequence[Grey], view: SphereView, spokes: Spokes, place:
     )
 
 
-def _likely_apart(spokes: Spokes, place: FloatArray, free: int) -> FloatArray:
+def _likely_apart(spokes: Spokes, place: Doubles, free: int) -> Doubles:
     """Return the covariance (5, 5) of outlines by how likely they are, by importance sampling about the likeliest."""
     normal = np.asarray(ndtri(Sobol(free, rng=np.random.default_rng(0)).random(DRAWS)), np.float64)
     scale = np.array([1, 1, 1, 2e-3, 2e-3])[:free]

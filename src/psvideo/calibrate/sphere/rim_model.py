@@ -24,9 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d  # type: ignore[attr-defined]
 
-from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import SphereView
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 
 Surface = Literal["mirror", "matte"]
 
@@ -52,8 +51,8 @@ LEAST_NOISE = 0.01
 
 
 def across_rim(
-    pictures: Sequence[Grey], view: SphereView, place: FloatArray, *, reach_px: float, spokes: int
-) -> tuple[FloatArray, FloatArray]:
+    pictures: Sequence[Floats], view: SphereView, place: Doubles, *, reach_px: float, spokes: int
+) -> tuple[Doubles, Doubles]:
     """Return brightness across an outline, (picture, spoke, step) from ``reach_px`` inside to outside, averaged along
     the rim between spokes, NaN outside the picture; and where the spokes cross the outline, (spoke, 2)."""
     per = max(int(np.ceil(2 * np.pi * place[2] / spokes)), 1)
@@ -76,27 +75,25 @@ def across_rim(
         .mean(axis=1)
         for picture in pictures
     ]
-    crossed: FloatArray = rim[per // 2 :: per][:spokes].astype(np.float64)
+    crossed: Doubles = rim[per // 2 :: per][:spokes].astype(np.float64)
     return np.asarray(values, np.float64), crossed
 
 
-def shifts(most_px: float) -> FloatArray:
+def shifts(most_px: float) -> Doubles:
     """Return the places of the rim that are tried, in pixels outward from the expected one."""
     count = round(most_px / SHIFT_PX)
     return np.arange(-count, count + 1, dtype=np.float64) * SHIFT_PX
 
 
-def likely_blur(
-    values: FloatArray, *, reach_px: float, most_px: float, surface: Surface, blurs: Sequence[float]
-) -> float:
+def likely_blur(values: Doubles, *, reach_px: float, most_px: float, surface: Surface, blurs: Sequence[float]) -> float:
     """Return which blur (standard deviation in pixels) explains profiles best, each at its own best place."""
     left = {blur: _unexplained(values, blur, reach_px, most_px, surface).min(axis=2) for blur in blurs}
     return min(left, key=lambda blur: float(np.median(np.log(left[blur]), axis=1).sum()))
 
 
 def log_likelihood(
-    values: FloatArray, *, blur_px: float, reach_px: float, most_px: float, surface: Surface, mirrored: bool = False
-) -> FloatArray:
+    values: Doubles, *, blur_px: float, reach_px: float, most_px: float, surface: Surface, mirrored: bool = False
+) -> Doubles:
     """Return how likely every place of the rim is on every spoke, over all pictures: (spoke, shift), up to a constant.
 
     Neighbouring samples share their noise over the blur's width, and count as one. What misleads one picture misleads
@@ -107,11 +104,11 @@ def log_likelihood(
     worth = independent / np.sqrt(len(values))
     if not (mirrored and surface == "mirror"):
         left = _unexplained(values, blur_px, reach_px, most_px, surface)
-        smooth: FloatArray = -0.5 * worth * np.log(left).sum(axis=0)
+        smooth: Doubles = -0.5 * worth * np.log(left).sum(axis=0)
         return smooth
     # every picture's edge has a brightness of its own, which costs as much as a number fitted to that many samples does
     cost = 0.5 * np.log(max(independent, 1.0)) * np.sqrt(len(values))
-    by_reflectance: list[FloatArray] = []
+    by_reflectance: list[Doubles] = []
     for reflectance in REFLECTANCES:
         plain, edged = _with_edge(values, blur_px, reach_px, most_px, reflectance)
         number = np.maximum(np.isfinite(edged).sum(axis=2), 1)
@@ -119,17 +116,17 @@ def log_likelihood(
         by_reflectance.append(np.logaddexp(np.log(1 - EDGED) - 0.5 * worth * plain, np.log(EDGED) + some_edge))
     # one ball has one reflectance, and its spokes together decide it, as this many independent ones
     speaks = np.array([np.logaddexp.reduce(one, axis=1).mean() * TELLING for one in by_reflectance])
-    total: FloatArray = np.logaddexp.reduce(np.array(by_reflectance) + (speaks - speaks.max())[:, None, None], axis=0)
+    total: Doubles = np.logaddexp.reduce(np.array(by_reflectance) + (speaks - speaks.max())[:, None, None], axis=0)
     return total
 
 
-def _steps(reach_px: float) -> FloatArray:
+def _steps(reach_px: float) -> Doubles:
     count = round(reach_px / STEP_PX)
     return np.arange(-count, count + 1, dtype=np.float64) * STEP_PX
 
 
 def _unexplained(
-    values: FloatArray, blur_px: float, reach_px: float, most_px: float, surface: Surface
+    values: Doubles, blur_px: float, reach_px: float, most_px: float, surface: Surface
 ) -> NDArray[np.float64]:
     """Return the variance that the model leaves, (picture, spoke, shift); 1 where a profile leaves the picture."""
     inside, known, spread = _profiles(values)
@@ -139,8 +136,8 @@ def _unexplained(
 
 
 def _with_edge(
-    values: FloatArray, blur_px: float, reach_px: float, most_px: float, reflectance: float
-) -> tuple[FloatArray, FloatArray]:
+    values: Doubles, blur_px: float, reach_px: float, most_px: float, reflectance: float
+) -> tuple[Doubles, Doubles]:
     """Return the logarithms of the variance that a mirror leaves, over all pictures: without an edge within its rim,
     (spoke, shift), and with one at the same place in every picture, (spoke, shift, edge), infinite outside the rim."""
     inside, known, spread = _profiles(values)
@@ -158,40 +155,40 @@ def _with_edge(
     return plain, np.where(is_edge, edged, np.inf)
 
 
-def _profiles(values: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+def _profiles(values: Doubles) -> tuple[NDArray[np.bool_], Doubles, Doubles]:
     """Return which profiles lie in the picture, the profiles with zeros elsewhere, and their spread."""
     inside: NDArray[np.bool_] = np.asarray(np.all(np.isfinite(values), axis=2), np.bool_)
     known = np.where(inside[..., None], values, 0.0)
     return inside, known, ((known - known.mean(axis=2, keepdims=True)) ** 2).sum(axis=2)
 
 
-def _left(known: FloatArray, basis: FloatArray) -> FloatArray:
+def _left(known: Doubles, basis: Doubles) -> Doubles:
     """Return the sum of squares (..., shift) of profiles (..., step) that orthonormal columns do not explain."""
     explained = np.einsum("ink,...n->...ik", basis, known, optimize=True)
-    left: FloatArray = np.maximum((known**2).sum(axis=-1)[..., None] - (explained**2).sum(axis=-1), 0)
+    left: Doubles = np.maximum((known**2).sum(axis=-1)[..., None] - (explained**2).sum(axis=-1), 0)
     return left
 
 
-def _noise(known: FloatArray, spread: FloatArray) -> FloatArray:
+def _noise(known: Doubles, spread: Doubles) -> Doubles:
     """Return the sum of squares that is left in any case: a share of the spread, and what float32 rounds off."""
-    least: FloatArray = (LEAST_NOISE**2 * spread + 1e-14 * (1 + (known**2).sum(axis=-1)))[..., None]
+    least: Doubles = (LEAST_NOISE**2 * spread + 1e-14 * (1 + (known**2).sum(axis=-1)))[..., None]
     return least
 
 
 @lru_cache(maxsize=64)
-def _basis(blur_px: float, reach_px: float, most_px: float, surface: Surface, reflectance: float = 1.0) -> FloatArray:
+def _basis(blur_px: float, reach_px: float, most_px: float, surface: Surface, reflectance: float = 1.0) -> Doubles:
     """Return orthonormal columns that span the model at every place of the rim, (shift, step, column)."""
     fine, shapes = _blurred(blur_px)
     away = _steps(reach_px)[None, :] - shifts(most_px)[:, None]
     shapes = {**shapes, "level": 1 - (1 - reflectance) * (1 - shapes["outside"])}
     columns = np.stack([np.interp(away, fine, shapes[name]) for name in _SHAPES[surface]], axis=2)
     columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-12)
-    basis: FloatArray = np.linalg.qr(columns)[0]
+    basis: Doubles = np.linalg.qr(columns)[0]
     return basis
 
 
 @lru_cache(maxsize=2 * len(REFLECTANCES))
-def _edges(blur_px: float, reach_px: float, most_px: float, reflectance: float) -> FloatArray:
+def _edges(blur_px: float, reach_px: float, most_px: float, reflectance: float) -> Doubles:
     """Return what an edge at every place adds to the model at every place of the rim, (shift, edge, step): unit
     vectors, and zeros where the edge is not within the rim or adds nothing of its own."""
     basis = _basis(blur_px, reach_px, most_px, "mirror", reflectance)
@@ -201,12 +198,12 @@ def _edges(blur_px: float, reach_px: float, most_px: float, reflectance: float) 
     added = steps[None] - np.einsum("ink,imk,dm->idn", basis, basis, steps, optimize=True)
     size = np.linalg.norm(added, axis=2, keepdims=True)
     within = places[None, :] <= shifts(most_px)[:, None] - max(1.0, blur_px)
-    edges: FloatArray = np.where(within[..., None] & (size > 0.05), added / np.maximum(size, 1e-9), 0.0)
+    edges: Doubles = np.where(within[..., None] & (size > 0.05), added / np.maximum(size, 1e-9), 0.0)
     return edges
 
 
 @lru_cache(maxsize=16)
-def _blurred(blur_px: float) -> tuple[FloatArray, dict[str, FloatArray]]:
+def _blurred(blur_px: float) -> tuple[Doubles, dict[str, Doubles]]:
     """Return places across a rim at 0 (positive outside), and the model's parts there."""
     fine = np.arange(-_LONGEST_PX, _LONGEST_PX + _FINE_PX / 2, _FINE_PX)
     outside = np.clip(fine / _FINE_PX + 0.5, 0, 1)

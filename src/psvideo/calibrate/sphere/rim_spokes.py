@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.sphere.rim_model import SHIFT_PX, Surface, across_rim, likely_blur, log_likelihood
-from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import SphereView
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 
 MISLED = 0.05
 """Chance that on a spoke something else than the rim is seen."""
@@ -32,18 +31,18 @@ class Spokes:
     """What the spokes show: logarithms of odds (spoke, shift), how each spoke's rim moves with the outline's numbers
     (spoke, number), where the spokes cross the outline they were taken at (spoke, 2), that outline, and the blur."""
 
-    odds: FloatArray
-    slopes: FloatArray
-    rim: FloatArray
-    around: FloatArray
+    odds: Doubles
+    slopes: Doubles
+    rim: Doubles
+    around: Doubles
     most_px: float
     blur_px: float
 
 
 def spokes_of(
-    pictures: Sequence[Grey],
+    pictures: Sequence[Floats],
     view: SphereView,
-    place: FloatArray,
+    place: Doubles,
     surface: Surface,
     most_px: float,
     *,
@@ -76,47 +75,47 @@ def spokes_of(
     )
 
 
-def _odds(logs: FloatArray, wavers_px: float) -> FloatArray:
+def _odds(logs: Doubles, wavers_px: float) -> Doubles:
     """Return the logarithm of how much likelier each shift is than chance, where a spoke may waver or be misled."""
     likely = np.exp(logs - logs.max(axis=1, keepdims=True))
     likely = likely @ _spread(likely.shape[1], wavers_px)
     likely /= likely.mean(axis=1, keepdims=True)
-    odds: FloatArray = np.log((1 - MISLED) * likely + MISLED)
+    odds: Doubles = np.log((1 - MISLED) * likely + MISLED)
     return odds
 
 
-def _spread(count: int, width_px: float) -> FloatArray:
+def _spread(count: int, width_px: float) -> Doubles:
     """Return the matrix (shift, shift) that blurs the odds of shifts by a standard deviation."""
     away = (np.arange(count)[:, None] - np.arange(count)) * SHIFT_PX / width_px
     kernel = np.exp(-0.5 * away**2)
-    spread: FloatArray = kernel / kernel.sum(axis=0)
+    spread: Doubles = kernel / kernel.sum(axis=0)
     return spread
 
 
-def _slopes(view: SphereView, rim: FloatArray, place: FloatArray) -> FloatArray:
+def _slopes(view: SphereView, rim: Doubles, place: Doubles) -> Doubles:
     """Return how far the rim moves outward on every spoke per unit of the outline's free numbers."""
     here = view.distance_px(rim, place)
     steps = np.diag([0.5, 0.5, 0.5, 1e-4, 1e-4])[: view.unknowns]
     return np.stack([(here - view.distance_px(rim, place + step)) / step.sum() for step in steps], axis=1)
 
 
-def agreeing(spokes: Spokes, place: FloatArray, free: int) -> tuple[NDArray[np.bool_], float]:
+def agreeing(spokes: Spokes, place: Doubles, free: int) -> tuple[NDArray[np.bool_], float]:
     """Return which spokes agree with an outline, and the evidence of all."""
     odds = looked_up(spokes.odds, spokes.slopes @ (place - spokes.around)[:free], spokes.most_px)
     agree: NDArray[np.bool_] = np.asarray(odds > np.log(AGREES), np.bool_)
     return agree, float(odds.sum())
 
 
-def widened(odds: FloatArray, width_px: float) -> FloatArray:
+def widened(odds: Doubles, width_px: float) -> Doubles:
     """Return odds of a rim that may lie off by ``width_px`` (standard deviation)."""
     if width_px == 0:
         return odds
     likely = np.exp(odds) @ _spread(odds.shape[1], width_px)
-    wider: FloatArray = np.log(likely / likely.mean(axis=1, keepdims=True))
+    wider: Doubles = np.log(likely / likely.mean(axis=1, keepdims=True))
     return wider
 
 
-def looked_up(odds: FloatArray, shift_px: FloatArray, most_px: float) -> FloatArray:
+def looked_up(odds: Doubles, shift_px: Doubles, most_px: float) -> Doubles:
     """Return odds at one shift per spoke, (spoke,) or (outline, spoke), between the ones tried; beyond them, of a spoke
     that is misled."""
     shifts = odds.shape[1]
@@ -124,6 +123,6 @@ def looked_up(odds: FloatArray, shift_px: FloatArray, most_px: float) -> FloatAr
     low = np.minimum(np.maximum(at.astype(np.intp), 0), shifts - 2)  # np.clip takes longer than all the rest
     share = np.minimum(np.maximum(at - low, 0.0), 1.0)
     flat = np.arange(0, odds.size, shifts) + low
-    between: FloatArray = odds.take(flat) * (1 - share) + odds.take(flat + 1) * share
+    between: Doubles = odds.take(flat) * (1 - share) + odds.take(flat + 1) * share
     beyond: NDArray[np.bool_] = np.abs(shift_px) > most_px
     return np.where(beyond, np.log(MISLED), between)

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
-
-Grey = NDArray[np.float32]
+from psvideo.model.arrays import Doubles, Floats
 
 SMALL_PX = 400
 """The longer side of the picture in which circles are looked for."""
@@ -35,7 +32,7 @@ class RoundThing:
     votes: float
 
 
-def round_things(picture: Grey, *, count: int = 6) -> list[RoundThing]:
+def round_things(picture: Floats, *, count: int = 6) -> list[RoundThing]:
     """Return the best circles of a picture (row, col) in the order of their votes times the root of their radius.
 
     Longer outlines count more at the same share, as they come less by chance. Circles that nearly coincide with a
@@ -67,7 +64,7 @@ def _differ(one: RoundThing, other: RoundThing) -> bool:
     return bool(apart > 0.12 * max(one.radius, other.radius))
 
 
-def _edges(picture: Grey) -> tuple[FloatArray, FloatArray]:
+def _edges(picture: Floats) -> tuple[Doubles, Doubles]:
     """Return edge points (edge, 2) and the unit gradients there, faint ones too where all around is even fainter."""
     smooth = cv2.GaussianBlur(picture, (0, 0), SMOOTHING_PX)
     across = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=3)
@@ -88,7 +85,7 @@ def _edges(picture: Grey) -> tuple[FloatArray, FloatArray]:
     return np.argwhere(crest)[:, ::-1].astype(np.float64), unit[crest].astype(np.float64)
 
 
-def _best_centre(points: FloatArray, facing: FloatArray, radius: float, shape: tuple[int, ...]) -> RoundThing:
+def _best_centre(points: Doubles, facing: Doubles, radius: float, shape: tuple[int, ...]) -> RoundThing:
     """Return the circle of one radius with most votes."""
     rows, cols = shape
     centres = np.concatenate([points + radius * facing, points - radius * facing]).round().astype(np.int64)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Vector
 
 
@@ -33,7 +33,7 @@ class SphereView:
         """How many of an outline's numbers are to be found: parallel rays leave the stretch open."""
         return 5 if self.focal_px is None else 3
 
-    def rays(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rays(self, points: Doubles) -> tuple[Doubles, Doubles]:
         """Return origins and unit directions, both (point, 3), of the viewing rays through points (point, 2)."""
         points = np.asarray(points, np.float64)
         zero = np.zeros(len(points))
@@ -43,29 +43,29 @@ class SphereView:
         across, down = (points - self.principal_px).T / self.focal_px
         return np.zeros((len(points), 3)), _unit(np.stack([across, -down, zero - 1.0], axis=1))
 
-    def sphere(self, outline: FloatArray) -> tuple[FloatArray, float]:
+    def sphere(self, outline: Doubles) -> tuple[Doubles, float]:
         """Return centre (3,) and radius of a sphere with this outline; in perspective the radius is taken as 1."""
         x, y, radius_px = outline[:3]
         if self.focal_px is None:
             return np.array([x, -y, -2.0 * radius_px]), float(radius_px)
         _, towards = self.rays(np.array([[x, y]]))
-        centre: FloatArray = towards[0] / np.sin(np.arctan2(radius_px, self.focal_px))
+        centre: Doubles = towards[0] / np.sin(np.arctan2(radius_px, self.focal_px))
         return centre, 1.0
 
-    def distance_px(self, points: FloatArray, outline: FloatArray) -> FloatArray:
+    def distance_px(self, points: Doubles, outline: Doubles) -> Doubles:
         """Return how far points (point, 2) lie outside an outline, in pixels; negative inside."""
         x, y, radius_px = outline[:3]
         if self.focal_px is None:
             away = points - outline[:2]
-            distance: FloatArray = np.hypot(*away.T) - radius_px * _stretch(away, outline)
+            distance: Doubles = np.hypot(*away.T) - radius_px * _stretch(away, outline)
             return distance
         _, towards = self.rays(np.array([[x, y]]))
         _, rays = self.rays(points)
         angle = np.arctan2(np.linalg.norm(np.cross(rays, towards), axis=1), rays @ towards[0])
-        outside: FloatArray = (angle - np.arctan2(radius_px, self.focal_px)) * self.focal_px
+        outside: Doubles = (angle - np.arctan2(radius_px, self.focal_px)) * self.focal_px
         return outside
 
-    def through(self, points: FloatArray) -> FloatArray | None:
+    def through(self, points: Doubles) -> Doubles | None:
         """Return the outline nearest to three or more points in an algebraic sense; None where there is none.
 
         A cone of half angle a about the unit vector c holds the unit rays d with ``d . c = cos a``, and a circle the
@@ -86,21 +86,21 @@ class SphereView:
         radius_px = self.focal_px * np.tan(np.arccos(1.0 / length))
         return np.array([*self.project(axis[None])[0], radius_px, 0.0, 0.0])
 
-    def project(self, vectors: NDArray[np.floating]) -> FloatArray:
+    def project(self, vectors: NDArray[np.floating]) -> Doubles:
         """Return where vectors (n, 3) from the optical centre (orthographic: points) appear, shape (n, 2)."""
         if self.focal_px is None:
             return np.stack([vectors[:, 0], -vectors[:, 1]], axis=1)
         across, up, back = vectors.T
-        seen: FloatArray = np.stack([-across / back, up / back], axis=1) * self.focal_px + np.array(self.principal_px)
+        seen: Doubles = np.stack([-across / back, up / back], axis=1) * self.focal_px + np.array(self.principal_px)
         return seen
 
-    def curve(self, outline: FloatArray, count: int = 360) -> FloatArray:
+    def curve(self, outline: Doubles, count: int = 360) -> Doubles:
         """Return points (count, 2) along an outline, evenly by angle."""
         turn = np.linspace(0, 2 * np.pi, count, endpoint=False)
         x, y, radius_px = outline[:3]
         if self.focal_px is None:
             ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-            rim: FloatArray = outline[:2] + radius_px * _stretch(ring, outline)[:, None] * ring
+            rim: Doubles = outline[:2] + radius_px * _stretch(ring, outline)[:, None] * ring
             return rim
         axis = self.rays(np.array([[x, y]]))[1][0]
         right = _unit(np.cross(axis, [0.0, 1.0, 0.0])[None])[0]
@@ -108,7 +108,7 @@ class SphereView:
         touched = radius_px / self.focal_px * (np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * down)
         return self.project(axis + touched)
 
-    def mirrored(self, outline: FloatArray, point: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def mirrored(self, outline: Doubles, point: Doubles) -> tuple[Doubles, Doubles] | None:
         """Return where the ray through a point meets the sphere, and the unit direction in which it is mirrored.
 
         That direction leads to the light whose highlight the point is. None where the ray misses the sphere.
@@ -128,22 +128,22 @@ class SphereView:
         normal = (met - centre) / radius
         return met, ray - 2 * (ray @ normal) * normal
 
-    def off_axis_deg(self, point: Vector | FloatArray, focal_px: float | None = None) -> float:
+    def off_axis_deg(self, point: Vector | Doubles, focal_px: float | None = None) -> float:
         """Return the angle between the lens's axis and the ray through a point, with this focal length or another."""
         focal = focal_px or self.focal_px
         away = float(np.hypot(point[0] - self.principal_px[0], point[1] - self.principal_px[1]))
         return 0.0 if focal is None else float(np.degrees(np.arctan2(away, focal)))
 
 
-def _stretch(away: FloatArray, outline: FloatArray) -> FloatArray:
+def _stretch(away: Doubles, outline: Doubles) -> Doubles:
     """Return by what factor an outline is longer than its radius in the directions of vectors (n, 2)."""
     twice = 2 * np.arctan2(away[:, 1], away[:, 0])
-    factor: FloatArray = 1.0 + outline[3] * np.cos(twice) + outline[4] * np.sin(twice)
+    factor: Doubles = 1.0 + outline[3] * np.cos(twice) + outline[4] * np.sin(twice)
     return factor
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
-    unit: FloatArray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+def _unit(vectors: Doubles) -> Doubles:
+    unit: Doubles = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     return unit
 
 

@@ -14,7 +14,7 @@ from psvideo.calibrate.stripes.spectrum import detrended, find_peaks, without
 from psvideo.calibrate.stripes.stripe_model import spline_basis
 from psvideo.calibrate.stripes.waveform import StripeFit, fit_stripes
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 FEWEST_PERIODS = 2.0
 SHORTEST_PERIOD_ROWS = 2.5
@@ -62,7 +62,7 @@ class FoundStripes:
     channel: int
 
 
-def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> FoundStripes:
+def find_stripes(profiles: Doubles, *, expected: float | None = None) -> FoundStripes:
     """Return the stripes in profiles of shape (frame, channel, block, row).
 
     ``expected`` is roughly their frequency, where the user knows it. Raises PsvideoError, without the footage's name,
@@ -110,7 +110,7 @@ NO_STRIPES = (
 )
 
 
-def _candidates(whole: FloatArray, expected: float | None) -> list[float]:
+def _candidates(whole: Doubles, expected: float | None) -> list[float]:
     """Return the frequencies that are worth a fit, each once."""
     peaks = find_peaks(whole)
     found = [] if expected is None else [expected]
@@ -123,7 +123,7 @@ def _candidates(whole: FloatArray, expected: float | None) -> list[float]:
     return distinct
 
 
-def _read(whole: FloatArray, frequency: float) -> FoundStripes:
+def _read(whole: Doubles, frequency: float) -> FoundStripes:
     """Fit one candidate in the channel where it is strongest."""
     rows = whole.shape[2]
     wave = np.exp(-2j * np.pi * frequency * np.arange(rows)) * np.hanning(rows)

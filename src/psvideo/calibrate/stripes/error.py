@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 FEWEST_CLUSTERS = 4
 REACHES_PERIODS = (0.0, 0.25, 0.5, 1.0)
@@ -21,10 +21,10 @@ MOST_LEVERAGE = 0.8
 class Pulls:
     """The residuals' pulls on the estimate, by row, by frame and by block of columns; ``information`` by row."""
 
-    rows: FloatArray
-    information: FloatArray
-    frames: FloatArray
-    groups: FloatArray
+    rows: Doubles
+    information: Doubles
+    frames: Doubles
+    groups: Doubles
 
 
 def standard_error(pulls: Pulls, period_rows: float) -> float:
@@ -45,7 +45,7 @@ def standard_error(pulls: Pulls, period_rows: float) -> float:
     return float(np.sqrt(max(*by_rows, *by_cluster)) / pulls.information.sum())
 
 
-def _spread(pulls: FloatArray, reach: int) -> float:
+def _spread(pulls: Doubles, reach: int) -> float:
     """Return the variance of a sum of pulls that are alike over less than ``reach`` rows."""
     likeness = np.array([pulls[lag:] @ pulls[: pulls.size - lag] for lag in range(min(reach, pulls.size))])
     taper = 1 - np.arange(likeness.size) / reach

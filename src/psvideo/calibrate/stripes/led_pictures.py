@@ -21,7 +21,7 @@ from psvideo.clip.folder import KINDS, MOVIES, find_sequence
 from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 MOST_FRAMES = 24
 """This many frames are read where the user names none: more would hardly make the result better."""
@@ -37,7 +37,7 @@ class LedPictures:
     """
 
     name: str
-    profiles: FloatArray
+    profiles: Doubles
     width_px: int
     places: tuple[int, ...] | None
     rate_hz: float | None = None
@@ -114,9 +114,9 @@ def _decoded(files: Sequence[Path]) -> Iterator[tuple[str, CodedPicture]]:
     return ((str(file), decode(KINDS[file.suffix.lower()], file)) for file in files)
 
 
-def _profiles(pictures: Iterator[tuple[str, CodedPicture]], columns: tuple[int, int] | None) -> tuple[FloatArray, int]:
+def _profiles(pictures: Iterator[tuple[str, CodedPicture]], columns: tuple[int, int] | None) -> tuple[Doubles, int]:
     """Return the profiles of all pictures and their width; raise PsvideoError where they are not alike."""
-    found: list[FloatArray] = []
+    found: list[Doubles] = []
     first: tuple[str, str] | None = None
     width_px = 0
     for name, picture in pictures:
@@ -146,7 +146,7 @@ def in_colours(picture: CodedPicture) -> NDArray[Any]:
     return green
 
 
-def _blocks(codes: NDArray[Any], begin: int, end: int) -> FloatArray:
+def _blocks(codes: NDArray[Any], begin: int, end: int) -> Doubles:
     """Return means over blocks of columns, shape (channel, block, row)."""
     count = int(np.clip((end - begin) // FEWEST_COLUMNS, 1, MOST_BLOCKS))
     edges = np.linspace(begin, end, count + 1).astype(np.int64)

@@ -16,7 +16,7 @@ from psvideo.calibrate.stripes.spectrum import find_fainter
 from psvideo.calibrate.stripes.steps import Direction, find_direction
 from psvideo.calibrate.stripes.waveform import StripeFit, fit_stripes
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 FEWEST_MOVING = 3
 PERIODS_PER_HALF = 3
@@ -107,7 +107,7 @@ def measure_readout(
     )
 
 
-def _find(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, StripeFit, float | None]:
+def _find(profiles: Doubles, expected: float | None) -> tuple[Doubles, StripeFit, float | None]:
     """Return the profiles (frame, block, row) in which stripes were found, their fit, and fainter ones' frequency.
 
     What stands still from frame to frame is the scene: where the stripes move, they are found in what is left without
@@ -121,7 +121,7 @@ def _find(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, Str
     return _fit(profiles, expected)
 
 
-def _fit(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, StripeFit, float | None]:
+def _fit(profiles: Doubles, expected: float | None) -> tuple[Doubles, StripeFit, float | None]:
     reading = find_stripes(profiles, expected=expected)
     coloured = profiles[:, reading.channel]
     fit = fit_stripes(coloured, reading.frequency)
@@ -129,7 +129,7 @@ def _fit(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, Stri
     return coloured, fit, find_fainter(coloured.mean(axis=1, keepdims=True), reading.frequency)
 
 
-def _over_halves(profiles: FloatArray, fit: StripeFit) -> tuple[float, tuple[str, ...]]:
+def _over_halves(profiles: Doubles, fit: StripeFit) -> tuple[float, tuple[str, ...]]:
     """Return the frequency's error, enlarged where the picture's halves contradict each other, and the warning."""
     rows = profiles.shape[2]
     if rows * fit.frequency < 2 * PERIODS_PER_HALF:

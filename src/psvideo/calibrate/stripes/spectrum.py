@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 PEAKS = 5
 OVERSAMPLING = 8
@@ -14,14 +14,14 @@ WINDOW_CYCLES = 3.0
 its neighbourhood, more than the window's width from the harmonics (this many) of the main ones."""
 
 
-def find_peaks(whole: FloatArray) -> list[float]:
+def find_peaks(whole: Doubles) -> list[float]:
     """Return where the spectrum over all frames and channels peaks, the highest first, in periods per row."""
     rows = whole.shape[2]
     power = _power(whole)
     return [top / (OVERSAMPLING * rows) for top in _tops(power, OVERSAMPLING)]
 
 
-def find_fainter(whole: FloatArray, frequency: float) -> float | None:
+def find_fainter(whole: Doubles, frequency: float) -> float | None:
     """Return the frequency of fainter stripes beside those of a frequency, None where none stand out."""
     rows = whole.shape[2]
     power = _power(whole)
@@ -39,28 +39,28 @@ def find_fainter(whole: FloatArray, frequency: float) -> float | None:
     return float(places[top]) if is_heard else None
 
 
-def _power(whole: FloatArray) -> FloatArray:
+def _power(whole: Doubles) -> Doubles:
     """Return the spectrum's power, summed over frames and channels, at multiples of 1 / (8 rows) periods per row."""
     rows = whole.shape[2]
     spectrum = np.fft.rfft(detrended(whole) * np.hanning(rows), OVERSAMPLING * rows, axis=2)
-    power: FloatArray = (np.abs(spectrum) ** 2).sum(axis=(0, 1))
+    power: Doubles = (np.abs(spectrum) ** 2).sum(axis=(0, 1))
     return power
 
 
-def _tops(curve: FloatArray, lowest: int) -> list[int]:
+def _tops(curve: Doubles, lowest: int) -> list[int]:
     """Return the places of the highest local maxima from ``lowest`` on, the highest first."""
     tops = 1 + np.flatnonzero((curve[1:-1] > curve[:-2]) & (curve[1:-1] >= curve[2:]))
     tops = tops[tops >= lowest]
     return [int(top) for top in tops[np.argsort(-curve[tops])][:PEAKS]]
 
 
-def detrended(profiles: FloatArray) -> FloatArray:
+def detrended(profiles: Doubles) -> Doubles:
     """Take a cubic off every profile: the scene's own fall of light."""
     return without(profiles, np.vander(np.linspace(-1, 1, profiles.shape[-1]), 4))
 
 
-def without(profiles: FloatArray, smooth: FloatArray) -> FloatArray:
+def without(profiles: Doubles, smooth: Doubles) -> Doubles:
     """Take off every profile what smooth functions, shape (row, function), can follow."""
     basis = np.linalg.qr(smooth)[0]
-    rest: FloatArray = profiles - (profiles @ basis) @ basis.T
+    rest: Doubles = profiles - (profiles @ basis) @ basis.T
     return rest

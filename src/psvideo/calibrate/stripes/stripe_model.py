@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 SPLINE_DEGREE = 2
 PERIODS_PER_SPAN = 2.0
@@ -28,11 +28,11 @@ ENVELOPE_PULL = 0.01
 class Nuisance(NamedTuple):
     """What each profile of one frame has of its own: coefficients (group, knot) and harmonics (group, cos then sin)."""
 
-    background: FloatArray
-    envelope: FloatArray
-    harmonics: FloatArray
+    background: Doubles
+    envelope: Doubles
+    harmonics: Doubles
 
-    def moved(self, step: FloatArray) -> "Nuisance":
+    def moved(self, step: Doubles) -> "Nuisance":
         """Add a step (group, unknown) in the order of the fields."""
         ends = np.cumsum([part.shape[1] for part in self])[:-1]
         return Nuisance(*(part + move for part, move in zip(self, np.split(step, ends, axis=1), strict=True)))
@@ -42,16 +42,16 @@ class Equations(NamedTuple):
     """One frame's Gauss-Newton equations: pull on the frequency and its information (group,) with the nuisance
     eliminated, the rows' shares of the pull, what the nuisance moves by itself and per unit of frequency, residuals."""
 
-    pull: FloatArray
-    information: FloatArray
-    row_pull: FloatArray
-    row_information: FloatArray
-    move: FloatArray
-    drag: FloatArray
-    residual: FloatArray
+    pull: Doubles
+    information: Doubles
+    row_pull: Doubles
+    row_information: Doubles
+    move: Doubles
+    drag: Doubles
+    residual: Doubles
 
 
-def spline_basis(rows: int, frequency: float) -> FloatArray:
+def spline_basis(rows: int, frequency: float) -> Doubles:
     """Return smooth functions of the row, shape (row, knot), that add up to 1 and cannot follow the stripes."""
     spans = int(np.clip(rows * frequency / PERIODS_PER_SPAN, 1, MOST_SPANS))
     inner = np.linspace(0, rows - 1, spans + 1)
@@ -60,24 +60,24 @@ def spline_basis(rows: int, frequency: float) -> FloatArray:
     return np.asarray(design.toarray(), np.float64)
 
 
-def waves_of(rows: int, frequency: float, harmonics: int) -> FloatArray:
+def waves_of(rows: int, frequency: float, harmonics: int) -> Doubles:
     """Return cosines, then sines, of all harmonics, shape (row, 2 * harmonic)."""
     phase = 2 * np.pi * frequency * _places(rows)[:, None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
 
 
-def _places(rows: int) -> FloatArray:
+def _places(rows: int) -> Doubles:
     return np.arange(rows, dtype=np.float64) - (rows - 1) / 2
 
 
-def start(frame: FloatArray, waves: FloatArray, smooth: FloatArray) -> Nuisance:
+def start(frame: Doubles, waves: Doubles, smooth: Doubles) -> Nuisance:
     """Fit one frame's profiles (group, row) by ``waves_of`` and ``spline_basis`` of its rows, with an envelope of 1."""
     found = np.asarray(np.linalg.lstsq(np.hstack([smooth, waves]), frame.T, rcond=None)[0].T, np.float64)
     knots = smooth.shape[1]
     return Nuisance(found[:, :knots], np.ones((len(frame), knots)), found[:, knots:])
 
 
-def stripe_equations(frame: FloatArray, own: Nuisance, waves: FloatArray, smooth: FloatArray) -> Equations:
+def stripe_equations(frame: Doubles, own: Nuisance, waves: Doubles, smooth: Doubles) -> Equations:
     """Set up the equations of one frame's profiles (group, row) around the present state."""
     shape, slope, change = _changes(own, waves, smooth)
     residual = frame - own.background @ smooth.T - shape
@@ -105,7 +105,7 @@ def stripe_equations(frame: FloatArray, own: Nuisance, waves: FloatArray, smooth
     )
 
 
-def _changes(own: Nuisance, waves: FloatArray, smooth: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _changes(own: Nuisance, waves: Doubles, smooth: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return the stripes (group, row), and their changes with the frequency and with all else (group, row, unknown)."""
     turn = 2 * np.pi * np.arange(1, waves.shape[1] // 2 + 1)
     cosines, sines = np.split(own.harmonics, 2, axis=1)
@@ -116,10 +116,10 @@ def _changes(own: Nuisance, waves: FloatArray, smooth: FloatArray) -> tuple[Floa
     return envelope * wave, slope, change
 
 
-def _weights(residual: FloatArray, stripes: FloatArray) -> FloatArray:
+def _weights(residual: Doubles, stripes: Doubles) -> Doubles:
     """Return each row's robust weight, shape (group, row), in units of each profile's own noise."""
     noise = 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
     uneven = stripes + residual
     scale = np.hypot(noise, MODEL_ERROR * uneven.std(axis=1, keepdims=True)) + DULLEST * uneven.std() + 1e-12
-    weight: FloatArray = 1 / (scale**2 + (residual / ROBUST_SCALE) ** 2)
+    weight: Doubles = 1 / (scale**2 + (residual / ROBUST_SCALE) ** 2)
     return weight

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.stripes.error import Pulls, standard_error
 from psvideo.calibrate.stripes.stripe_model import Equations, Nuisance, spline_basis, start, stripe_equations, waves_of
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 STAGES = (1, 3, 8, 16)
 """Harmonics, from coarse to fine: many of them locate edges sharply, but only from close by."""
@@ -43,9 +43,9 @@ class StripeFit:
 
     frequency: float
     frequency_error: float
-    frame_frequencies: FloatArray
+    frame_frequencies: Doubles
     fundamental: NDArray[np.complex128]
-    swing: FloatArray
+    swing: Doubles
     unexplained: float
 
 
@@ -62,7 +62,7 @@ class _Solution(NamedTuple):
         return int(self.state[0].harmonics.shape[1]) // 2
 
 
-def fit_stripes(profiles: FloatArray, frequency: float, *, most_harmonics: int = STAGES[-1]) -> StripeFit:
+def fit_stripes(profiles: Doubles, frequency: float, *, most_harmonics: int = STAGES[-1]) -> StripeFit:
     """Refine the frequency of stripes in profiles, shape (frame, group, row), from a start within half a cycle.
 
     Method: separable least squares (Golub and Pereyra 1973) with Cauchy weights.
@@ -79,7 +79,7 @@ def fit_stripes(profiles: FloatArray, frequency: float, *, most_harmonics: int =
     return _summary(profiles, best)
 
 
-def _settle(profiles: FloatArray, frequency: float, harmonics: int, smooth: FloatArray) -> _Solution:
+def _settle(profiles: Doubles, frequency: float, harmonics: int, smooth: Doubles) -> _Solution:
     """Solve for this many harmonics."""
     rows = profiles.shape[2]
     lowest, highest = max(frequency - 1 / rows, 1 / rows), frequency + 1 / rows
@@ -106,7 +106,7 @@ def _needed(solution: _Solution) -> int:
     return int(heard[-1]) + 1 if heard.size else 1
 
 
-def _summary(profiles: FloatArray, solution: _Solution) -> StripeFit:
+def _summary(profiles: Doubles, solution: _Solution) -> StripeFit:
     frequency, state, found = solution
     information = np.array([part.information.sum() for part in found])
     pull = np.array([part.pull for part in found])

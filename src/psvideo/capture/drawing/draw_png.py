@@ -2,12 +2,11 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.capture.drawing.shapes import Drawing, Label, Polygon
 from psvideo.errors import PsvideoError
+from psvideo.model.arrays import Pixels
 
-Canvas = NDArray[np.uint8]
 OVERSAMPLING = 3
 SCALE = 2
 """Pixels of the PNG per unit of the picture, so that it stays sharp on dense screens."""
@@ -33,7 +32,7 @@ def png(picture: Drawing) -> bytes:
     return data.tobytes()
 
 
-def _paint(canvas: Canvas, shape: Polygon, grow: int) -> None:
+def _paint(canvas: Pixels, shape: Polygon, grow: int) -> None:
     points = np.round(np.array(shape.points, np.float64).reshape(-1, 1, 2) * grow).astype(np.int32)
     if len(points) == 0:
         return
@@ -44,7 +43,7 @@ def _paint(canvas: Canvas, shape: Polygon, grow: int) -> None:
         cv2.polylines(canvas, [points], shape.closed, _bgr(shape.stroke), width, cv2.LINE_AA)
 
 
-def _write(canvas: Canvas, label: Label, grow: int) -> None:
+def _write(canvas: Pixels, label: Label, grow: int) -> None:
     text = label.text.translate(PLAIN)
     scale, weight = label.size * grow / FONT_HEIGHT_PX, max(round(label.size * grow / 13), 1)
     (width, height), _ = cv2.getTextSize(text, FONT, scale, weight)

@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.cost.shoot_figures import slot_label
 from psvideo.model.plan import Plan
 
@@ -175,7 +176,7 @@ def _dark_rows(camera: Camera, start_s: float, flashes: tuple[FlashSpan, ...]) -
     return rows
 
 
-def _row_at(camera: Camera, offset_s: FloatArray) -> FloatArray:
+def _row_at(camera: Camera, offset_s: Doubles) -> Doubles:
     """Return the row (a continuous coordinate, 0 is the top edge) that opens at an offset from its frame's start."""
     first = 0.0 if camera.row_time_s > 0 else float(camera.height_px)
     return first + offset_s / camera.row_time_s

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
+from psvideo.model.arrays import Floats
 
-Floats = NDArray[np.float32]
 BORDER = 2
 EIGHTH, HALF, ONE_AND_A_HALF = np.float32(1 / 8), np.float32(1 / 2), np.float32(3 / 2)
 TWO, FOUR, FIVE, SIX = np.float32(2), np.float32(4), np.float32(5), np.float32(6)

@@ -15,6 +15,7 @@ from psvideo.clip.decode.decoders import decode, guarded
 from psvideo.clip.decode.exr import decode_channels
 from psvideo.clip.folder import KINDS, find_sequence
 from psvideo.errors import PsvideoError
+from psvideo.model.arrays import Floats
 from psvideo.model.irradiance.ground import FARTHEST_M
 
 DEPTH_NAMES = ("Z", "depth", "distance", "Y", "V", "L", "R")
@@ -24,8 +25,6 @@ BACKGROUND = 1e6
 NEAREST_M = 0.01
 """Between this and FARTHEST_M lies the middle of any scene that near lights can light."""
 MILLIMETRE_M = 1e-3
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True)

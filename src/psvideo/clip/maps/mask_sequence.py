@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from psvideo.clip.folder import KINDS, find_sequence
 from psvideo.clip.maps.mask import read_mask
 from psvideo.clip.record import holes
 from psvideo.compute.threads import in_order
 from psvideo.errors import PsvideoError
+from psvideo.model.arrays import Mask
 
-Mask = NDArray[np.bool_]
 PLACEHOLDER = re.compile(r"%0?\d*d|#+|@+|\*")
 """What stands for the number in a pattern of file names: mask.%04d.png, mask.####.png, mask.*.png."""
 

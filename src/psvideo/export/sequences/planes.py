@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.export.space import Space, placed, placed_points
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.choices import Program
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.surface import Surface
@@ -30,7 +30,7 @@ class InstantPictures:
     space: Space
     beauty: Image | None = None
     depth: Depth | None = None
-    age_s: FloatArray | None = None
+    age_s: Doubles | None = None
     passes: Passes = field(default_factory=Passes)
     motion: Callable[[], Image] | None = None
     program: Program | None = None

@@ -8,7 +8,7 @@ import numpy as np
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import read_text
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 ROTATION_TOLERANCE = 1e-3
 LAST_ROW = (0.0, 0.0, 0.0, 1.0)
@@ -18,8 +18,8 @@ LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 class Pose:
     """A camera in the world: ``rotation`` (3, 3), its right, up and backwards as columns, and ``origin`` (3,)."""
 
-    rotation: FloatArray
-    origin: FloatArray
+    rotation: Doubles
+    origin: Doubles
 
 
 def read_pose(path: Path) -> Pose:
@@ -43,7 +43,7 @@ def read_pose(path: Path) -> Pose:
     return pose_of(matrix, source=str(path))
 
 
-def pose_of(matrix: FloatArray, *, source: str) -> Pose:
+def pose_of(matrix: Doubles, *, source: str) -> Pose:
     """Return the pose in a camera-to-world matrix (4, 4) for column vectors; a uniform scale is divided out.
 
     ``source`` is what messages call it. Raises PsvideoError where the matrix is no rotation with a place.

@@ -17,7 +17,7 @@ from psvideo.export.mesh_files import animation_name
 from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.usd.usd_material import MATERIAL, material
 from psvideo.export.usd.usda import asset, identifiers, indented, matrix_of, numbers_of, prim
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Light
 
 CARD_M = 1.0
@@ -43,7 +43,7 @@ class StageView:
     focal: float | None
     middle: tuple[float, float]
     away_m: float | None
-    poses: Mapping[int, FloatArray]
+    poses: Mapping[int, Doubles]
     lights: Sequence[SeenLight]
     near: Sequence[Light] = ()
 

@@ -6,7 +6,7 @@ from itertools import chain, count
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 
 def indented(lines: Sequence[str]) -> list[str]:
@@ -20,7 +20,7 @@ def prim(head: str, *parts: Sequence[str] | str) -> list[str]:
     return [head, "{", *indented(inner), "}"]
 
 
-def numbers_of(values: Sequence[float] | FloatArray) -> str:
+def numbers_of(values: Sequence[float] | Doubles) -> str:
     """Return a tuple.
 
     >>> numbers_of([1, 0.5])
@@ -29,7 +29,7 @@ def numbers_of(values: Sequence[float] | FloatArray) -> str:
     return "(" + ", ".join(f"{value:.9g}" for value in values) + ")"
 
 
-def matrix_of(matrix: FloatArray) -> str:
+def matrix_of(matrix: Doubles) -> str:
     """Return a matrix as USD has it: rows are what the axes become, the last one the place."""
     return "(" + ", ".join(numbers_of(row) for row in np.asarray(matrix).T) + ")"
 

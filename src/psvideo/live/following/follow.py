@@ -16,7 +16,7 @@ from psvideo.live.following.lock import Lock
 from psvideo.live.following.phase_filter import Measured, PhaseFilter, started
 from psvideo.live.following.trims import Trims, trimmed
 from psvideo.live.following.window import HeldFrame, Window, window_of
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.seed import GOOD_SEED, gain_of
@@ -77,7 +77,7 @@ class Follower:
     measured: list[Measured] = field(default_factory=list)
     trims: Trims = field(default_factory=Trims)
     share: float = 1.0
-    _light: FloatArray | None = None
+    _light: Doubles | None = None
     _learnt: Profiles | None = None
     _usual: float = 0.0
     _odd: list[int] = field(default_factory=list)
@@ -108,7 +108,7 @@ class Follower:
         since_s = self.window.frames[0].index * self.window.period_s if self.window.frames else at_s
         self.phase = trimmed(self.phase, self.trims, at_s, ppm, since_s=since_s)
 
-    def add(self, index: int, value: FloatArray, doubt: FloatArray | None = None) -> int:
+    def add(self, index: int, value: Doubles, doubt: Doubles | None = None) -> int:
         """Take in the frame that is numbered ``index`` and return its place in time; ``value`` (row,) is its profile.
 
         A frame that comes twice is left out.
@@ -184,7 +184,7 @@ class Follower:
         best = int((losses + STEP_COST * np.arange(len(losses))).argmin())
         return best if losses[best] < min(self._usual, losses[0] - SUSPICIOUS) + SUSPICIOUS else 0
 
-    def _losses(self, rows: Profiles) -> FloatArray:
+    def _losses(self, rows: Profiles) -> Doubles:
         assert self._learnt is not None  # noqa: S101
         assert self._light is not None  # noqa: S101
         return losses_of(self.plan, self._learnt, rows, replace(self.beat, clock=self.clock), self._light)
@@ -205,7 +205,7 @@ class Follower:
             self.phase = self.phase.corrected(at_s, shift_s, error_s)
         self._learn(rows)
 
-    def _judge(self, rows: Profiles, rest: FloatArray) -> None:
+    def _judge(self, rows: Profiles, rest: Doubles) -> None:
         """Judge whether the latest frames show the strobe where the clock has it, and as well as those before did.
 
         Right after a change of light nobody knows: new brightnesses explain a few frames wherever flashes are.
@@ -264,8 +264,8 @@ def following(plan: Plan, lock: Lock) -> Follower:
 def caught_up(
     plan: Plan,
     lock: Lock,
-    values: Sequence[FloatArray],
-    doubts: Sequence[FloatArray | None] | None = None,
+    values: Sequence[Doubles],
+    doubts: Sequence[Doubles | None] | None = None,
     *,
     numbers: Sequence[int] | None = None,
 ) -> Follower:
@@ -286,7 +286,7 @@ def caught_up(
     return follower
 
 
-def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[float, float]:
+def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: Doubles) -> tuple[float, float]:
     """Return by how much all flashes come later than a beat says, and the standard error: one robust step."""
     scale = errors_of_residuals(rows, rest, 0.0)
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, predictions
@@ -22,7 +22,7 @@ NORMAL = 1.4826
 """A normal distribution's standard deviation in median absolute deviations."""
 
 
-def shift_of(plan: Plan, rows: Profiles, beat: Beat, *, learnt: Profiles, light: FloatArray) -> tuple[float, float]:
+def shift_of(plan: Plan, rows: Profiles, beat: Beat, *, learnt: Profiles, light: Doubles) -> tuple[float, float]:
     """Return by how many seconds the flashes in ``rows`` come later than a beat says, and the standard error.
 
     ``light`` are the brightnesses that ``learnt`` frames gave.

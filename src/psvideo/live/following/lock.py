@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import UsageError
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Order
 from psvideo.sync.find import find_strobe
@@ -69,7 +70,7 @@ def rows_to_lock(plan: Plan) -> int:
 def lock(
     plan: Plan,
     index: NDArray[np.int64],
-    profiles: FloatArray,
+    profiles: Doubles,
     *,
     doubt: NDArray[np.floating] | None = None,
     first_light: str | None = None,

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.sync.rowfit.beat import FoundClock
 
 WANDER_PPM = 1.0
@@ -35,7 +35,7 @@ class PhaseFilter:
 
     clock: FoundClock
     at_s: float
-    covariance: FloatArray
+    covariance: Doubles
 
     @property
     def error_s(self) -> float:
@@ -60,7 +60,7 @@ def started(clock: FoundClock, at_s: float, error_s: float, error_ppm: float) ->
     return PhaseFilter(clock=clock, at_s=at_s, covariance=np.diag([error_s**2, error_ppm**2]))
 
 
-def smoothed(points: Sequence[Measured]) -> FloatArray:
+def smoothed(points: Sequence[Measured]) -> Doubles:
     """Return the shifts (measurement,) at the times of the measurements that all of them together give."""
     first = points[0]
     state, covariance = np.array([first.late_s, 0.0]), np.diag([first.error_s**2, 1e6])
@@ -82,14 +82,14 @@ def smoothed(points: Sequence[Measured]) -> FloatArray:
     return np.array(found[::-1])
 
 
-def _forward(step_s: float) -> FloatArray:
+def _forward(step_s: float) -> Doubles:
     return np.array([[1.0, 1e-6 * step_s], [0.0, 1.0]])
 
 
-def _grown(covariance: FloatArray, step_s: float) -> FloatArray:
+def _grown(covariance: Doubles, step_s: float) -> Doubles:
     """Return what is known after a time without measurements, before or after."""
     forward, wander = _forward(step_s), WANDER_PPM**2 * abs(step_s)
     lever = 1e-6 * step_s
     noise = wander * np.array([[lever**2 / 3, lever / 2], [lever / 2, 1.0]])
-    grown: FloatArray = forward @ covariance @ forward.T + noise
+    grown: Doubles = forward @ covariance @ forward.T + noise
     return grown

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from psvideo.live.following.phase_filter import PhaseFilter
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.sync.rowfit.beat import FoundClock
 
 LATENCY_S = 0.02
@@ -49,7 +49,7 @@ class Trims:
             without_s = at_s - self._late_at_s(without_s)
         return without_s
 
-    def late_s(self, time_s: FloatArray) -> FloatArray:
+    def late_s(self, time_s: Doubles) -> Doubles:
         """Return by how much flashes come later at times, same shape, than without any trim."""
         return np.array([self._late_at_s(one_s) for one_s in time_s.ravel().tolist()]).reshape(time_s.shape)
 

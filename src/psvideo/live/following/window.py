@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import FLASH_ROWS
@@ -26,8 +26,8 @@ class HeldFrame:
     """One frame: its place in time, its row means (row,) and by how much these may be wrong (None: not)."""
 
     index: int
-    value: FloatArray
-    doubt: FloatArray | None = None
+    value: Doubles
+    doubt: Doubles | None = None
 
 
 @dataclass(kw_only=True)
@@ -93,7 +93,7 @@ class Window:
         self._place = rows.place
         return rows
 
-    _place: FloatArray = field(default_factory=lambda: np.empty(0))
+    _place: Doubles = field(default_factory=lambda: np.empty(0))
 
 
 def window_of(plan: Plan, beat: Beat) -> Window:

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
-
-Floats = NDArray[np.float32]
+from psvideo.model.arrays import Floats
 
 
 @EXACT.kept

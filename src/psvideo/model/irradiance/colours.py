@@ -17,7 +17,7 @@ from itertools import takewhile
 import numpy as np
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix
 from psvideo.model.rig import Light, Rig, Vector, intensities
@@ -36,7 +36,7 @@ class OneFlash:
     gives each from the channels, once these are divided by the surface's colour."""
 
     lights: tuple[int, ...]
-    inverse: FloatArray
+    inverse: Doubles
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +62,7 @@ class Unmixing:
 
     shown: Plan
     rig: Rig
-    shares: FloatArray | None
+    shares: Doubles | None
     alone: tuple[OneFlash, ...]
     surface_colour: Vector | None
     condition: float
@@ -88,7 +88,7 @@ def unmixing_of(plan: Plan, rig: Rig, *, channels: int) -> Unmixing | None:
     return _one_by_one(plan, rig, seen, condition)
 
 
-def condition_of(matrix: FloatArray) -> float:
+def condition_of(matrix: Doubles) -> float:
     """Return by how much a matrix's inverse raises noise at most: 1 at best, infinite where columns cannot be told
     apart."""
     values = np.linalg.svd(matrix, compute_uv=False)
@@ -97,13 +97,13 @@ def condition_of(matrix: FloatArray) -> float:
     return float(values[0] / values[-1])
 
 
-def colour_condition(seen: FloatArray) -> float:
+def colour_condition(seen: Doubles) -> float:
     """Return the condition number of lights' colours, (light, channel), whatever their strengths."""
     length = np.linalg.norm(seen, axis=1, keepdims=True)
     return condition_of((seen / np.maximum(length, 1e-300)).T)
 
 
-def most_alike(seen: FloatArray) -> tuple[int, int]:
+def most_alike(seen: Doubles) -> tuple[int, int]:
     """Return which two lights' colours, (light, channel), are most alike."""
     unit = seen / np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-300)
     alike = unit @ unit.T - 2 * np.eye(len(seen))
@@ -149,9 +149,7 @@ def _in_one_place(one: Light, other: Light) -> bool:
     return False
 
 
-def _exchanged(
-    plan: Plan, rig: Rig, lamps: Sequence[tuple[int, ...]], by_lamp: FloatArray, condition: float
-) -> Unmixing:
+def _exchanged(plan: Plan, rig: Rig, lamps: Sequence[tuple[int, ...]], by_lamp: Doubles, condition: float) -> Unmixing:
     names = _lamp_names(plan.lights, lamps)
     home = {plan.lights[light]: name for lamp, name in zip(lamps, names, strict=True) for light in lamp}
     shares = np.stack([np.linalg.pinv(by_lamp[..., channel]) for channel in range(CHANNELS)], axis=-1)
@@ -166,7 +164,7 @@ def _exchanged(
     )
 
 
-def _one_by_one(plan: Plan, rig: Rig, seen: FloatArray, condition: float) -> Unmixing:
+def _one_by_one(plan: Plan, rig: Rig, seen: Doubles, condition: float) -> Unmixing:
     alone = []
     for row, slot in enumerate(plan.lit_slots):
         one = _one_flash(seen[row])
@@ -183,7 +181,7 @@ def _one_by_one(plan: Plan, rig: Rig, seen: FloatArray, condition: float) -> Unm
     )
 
 
-def _one_flash(seen: FloatArray) -> OneFlash | None:
+def _one_flash(seen: Doubles) -> OneFlash | None:
     """Return what a flash of these lights (light, channel) shows by itself, None where that is too little."""
     lit = np.flatnonzero(seen.any(axis=1))
     if len(lit) > CHANNELS or colour_condition(seen[lit]) > MOST_COLOUR_CONDITION:
@@ -191,7 +189,7 @@ def _one_flash(seen: FloatArray) -> OneFlash | None:
     return OneFlash(lights=tuple(int(place) for place in lit), inverse=np.linalg.pinv(seen[lit].T).astype(np.float64))
 
 
-def _inseparable(plan: Plan, slot: int, seen: FloatArray, between: float) -> PsvideoError:
+def _inseparable(plan: Plan, slot: int, seen: Doubles, between: float) -> PsvideoError:
     lit = np.flatnonzero(seen.any(axis=1))
     names = [plan.lights[place] for place in lit]
     if len(lit) > CHANNELS:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 DEGREE = 4
 POWERS = tuple((across, down) for total in range(DEGREE + 1) for down in range(total + 1) for across in [total - down])
@@ -51,9 +51,9 @@ class Falloff:
 
 def terms(
     cols: NDArray[np.integer], rows: NDArray[np.integer], *, width_px: int, height_px: int
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Doubles, Doubles]:
     """Return columns and rows counted from the picture's middle, in half its width."""
     half = width_px / 2
-    across: FloatArray = (cols.astype(np.float64) - (width_px - 1) / 2) / half
-    down: FloatArray = (rows.astype(np.float64) - (height_px - 1) / 2) / half
+    across: Doubles = (cols.astype(np.float64) - (width_px - 1) / 2) / half
+    down: Doubles = (rows.astype(np.float64) - (height_px - 1) / 2) / half
     return across, down

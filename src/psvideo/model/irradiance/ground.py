@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Rig
 
 FARTHEST_M = 50.0
@@ -32,7 +32,7 @@ class Ground:
     """
 
     depth_m: NDArray[np.float32]
-    middle_m: FloatArray
+    middle_m: Doubles
     focal_px: tuple[float, float]
     principal_px: tuple[float, float]
     unsure: NDArray[np.float32] | None = None
@@ -45,20 +45,20 @@ class Ground:
 
 
 def rays(
-    focal_px: tuple[float, float], principal_px: tuple[float, float], *, col: FloatArray, row: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    focal_px: tuple[float, float], principal_px: tuple[float, float], *, col: Doubles, row: Doubles
+) -> tuple[Doubles, Doubles]:
     """Return x and y of the ray (x, y, -1) through places of the picture, of the shapes of ``col`` and ``row``."""
     return (col - principal_px[0]) / focal_px[0], -(row - principal_px[1]) / focal_px[1]
 
 
-def inverse_depth(plane: tuple[float, float, float, float], x: FloatArray, y: FloatArray) -> FloatArray:
+def inverse_depth(plane: tuple[float, float, float, float], x: Doubles, y: Doubles) -> Doubles:
     """Return 1 / depth in 1/m at which rays (x, y, -1) meet a plane (a, b, c, d); 0 or less: nowhere in front.
 
     >>> inverse_depth((0.0, 0.0, 1.0, 1.25), np.array([0.0, 0.3]), np.array([0.0, -0.2]))
     array([0.8, 0.8])
     """
     a, b, c, d = plane
-    towards: FloatArray = c - a * x - b * y
+    towards: Doubles = c - a * x - b * y
     return towards / d if d else np.zeros_like(towards)
 
 
@@ -96,7 +96,7 @@ def spread(known_m: NDArray[np.floating]) -> NDArray[np.floating]:
     return everywhere
 
 
-def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
+def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> Doubles:
     """Return the depth of the rig's plane in every pixel."""
     if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
         raise ValueError("a rig with camera and plane expected")
@@ -109,7 +109,7 @@ def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
             "Expected a, b, c, d of a x + b y + c z + d = 0 in metres with the scene at negative z: [0, 0, 1, 1.2] is "
             "a wall at 1.2 m."
         )
-    depth_m: FloatArray = 1 / np.maximum(inverse_m, FARTHEST_SHARE * inverse_m.max())
+    depth_m: Doubles = 1 / np.maximum(inverse_m, FARTHEST_SHARE * inverse_m.max())
     if depth_m[row, col] > FARTHEST_M:
         raise PsvideoError(
             f"The rig's [surface] plane {list(rig.plane)} is {depth_m[row, col]:g} m away in the picture's middle, "
@@ -120,7 +120,7 @@ def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
 
 def every_ray(
     focal_px: tuple[float, float], principal_px: tuple[float, float], height_px: int, width_px: int
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Doubles, Doubles]:
     """Return x (1, col) and y (row, 1) of the ray (x, y, -1) through every pixel's centre."""
     cols, rows = np.arange(width_px, dtype=np.float64), np.arange(height_px, dtype=np.float64)
     return rays(focal_px, principal_px, col=cols[None, :], row=rows[:, None])

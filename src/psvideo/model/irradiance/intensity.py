@@ -8,13 +8,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from psvideo.model.arrays import Image
 from psvideo.model.plan import Plan, reference_duration_s
 from psvideo.model.rig import Light, Rig
 from psvideo.model.rows.clipping import at_saturation
 
-Image = NDArray[np.float32]
 CHANNELS = 3
 
 

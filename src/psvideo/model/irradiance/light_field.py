@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import inverse_depth, rays
 from psvideo.model.irradiance.intensity import measured_duration_s
 from psvideo.model.irradiance.near_light import is_near, near_vectors
@@ -23,13 +23,13 @@ class Points:
     """Points of a picture: ``down`` and ``across`` (point,) as shares of its height and width, 0 at the top left
     corner, and which of its ``channels`` each is taken in, ``channel`` (point,)."""
 
-    down: FloatArray
-    across: FloatArray
+    down: Doubles
+    across: Doubles
     channel: NDArray[np.intp]
     channels: int
 
 
-def light_vectors(plan: Plan, rig: Rig, points: Points) -> FloatArray:
+def light_vectors(plan: Plan, rig: Rig, points: Points) -> Doubles:
     """Return what every lit slot's flash sends to points of the picture, shape (point, lit slot, 3).
 
     Near lights need the rig's camera and plane.
@@ -50,34 +50,34 @@ def light_vectors(plan: Plan, rig: Rig, points: Points) -> FloatArray:
     return np.stack(slots, axis=1)
 
 
-def points_on_plane(plan: Plan, rig: Rig, *, down: FloatArray, across: FloatArray) -> FloatArray:
+def points_on_plane(plan: Plan, rig: Rig, *, down: Doubles, across: Doubles) -> Doubles:
     """Return where the rays through points of the picture meet the rig's plane, in metres, shape (point, 3)."""
     if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
         raise ValueError("near lights need the rig's camera and plane")
     col = across * plan.camera.width_px - 0.5
     row = down * plan.camera.height_px - 0.5
     x, y = rays(rig.focal_px, rig.principal_px, col=col, row=row)
-    points: FloatArray = np.stack([x, y, -np.ones_like(x)], axis=1) / inverse_depth(rig.plane, x, y)[:, None]
+    points: Doubles = np.stack([x, y, -np.ones_like(x)], axis=1) / inverse_depth(rig.plane, x, y)[:, None]
     return points
 
 
-def _strength(light: Light, points: Points) -> FloatArray:
+def _strength(light: Light, points: Points) -> Doubles:
     """Return a light's intensity in each point's channel; its mean where it was measured in other channels."""
     strengths = np.array(light.by_channel, np.float64)
     if len(strengths) == points.channels:
-        chosen: FloatArray = strengths[points.channel]
+        chosen: Doubles = strengths[points.channel]
         return chosen
     return np.full(len(points.channel), strengths.mean())
 
 
-def _field(light: Light, points_m: FloatArray | None, middle_m: FloatArray | None) -> FloatArray:
+def _field(light: Light, points_m: Doubles | None, middle_m: Doubles | None) -> Doubles:
     """Return the direction to a light times its falloff, shape (point, 3), or (3,) for a distant one."""
     if light.direction is not None:
         return np.array(light.direction, np.float64)
     if points_m is None or middle_m is None:
         raise ValueError(f"light {light.name!r} is near: it needs points in space")
     position_m = np.array(light.position_m)
-    axis: FloatArray | None = None
+    axis: Doubles | None = None
     if light.anisotropy:
         axis = np.array(light.axis) if light.axis is not None else middle_m - position_m
         axis = axis / np.linalg.norm(axis)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import FARTHEST_M, Ground, every_ray
 from psvideo.model.rig import Light
 
@@ -31,11 +31,11 @@ class NearField:
     middle_gain: (light,), irradiance at the ground's middle over that at 1 m, 1 for a distant light.
     """
 
-    positions_m: FloatArray
+    positions_m: Doubles
     is_near: NDArray[np.bool_]
-    axes: FloatArray
-    anisotropy: FloatArray
-    middle_gain: FloatArray
+    axes: Doubles
+    anisotropy: Doubles
+    middle_gain: Doubles
     ground: Ground
 
 
@@ -70,14 +70,14 @@ def near_field(lights: Sequence[Light], ground: Ground) -> NearField:
     )
 
 
-def middle_directions(field: NearField) -> FloatArray:
+def middle_directions(field: NearField) -> Doubles:
     """Return the unit directions to the lights from the ground's middle, shape (light, 3)."""
     away_m = np.where(field.is_near[:, None], field.positions_m - field.ground.middle_m, field.positions_m)
-    directions: FloatArray = away_m / np.linalg.norm(away_m, axis=1, keepdims=True)
+    directions: Doubles = away_m / np.linalg.norm(away_m, axis=1, keepdims=True)
     return directions
 
 
-def _check_position(light: Light, position_m: FloatArray, ground: Ground) -> None:
+def _check_position(light: Light, position_m: Doubles, ground: Ground) -> None:
     said = f"Light {light.name!r} has position_m = {[float(f'{value:g}') for value in position_m]}"
     if np.abs(position_m).max() > FARTHEST_M:
         raise PsvideoError(
@@ -99,7 +99,7 @@ def _check_position(light: Light, position_m: FloatArray, ground: Ground) -> Non
         )
 
 
-def field_of(light: Light, ground: Ground | None, part: tuple[slice, slice]) -> FloatArray:
+def field_of(light: Light, ground: Ground | None, part: tuple[slice, slice]) -> Doubles:
     """Return what a light of intensity 1 sends to a part of the picture: direction times irradiance, (row, col, 3).
 
     Of a distant light one vector, (1, 1, 3). Made for calibration; the solvers place lights by themselves. Raises
@@ -119,9 +119,7 @@ def field_of(light: Light, ground: Ground | None, part: tuple[slice, slice]) -> 
     return near_vectors(points_m, np.array(light.position_m), axis=axis, anisotropy=light.anisotropy or 0.0)
 
 
-def near_vectors(
-    points_m: FloatArray, position_m: FloatArray, *, axis: FloatArray | None, anisotropy: float
-) -> FloatArray:
+def near_vectors(points_m: Doubles, position_m: Doubles, *, axis: Doubles | None, anisotropy: float) -> Doubles:
     """Return what a near light of intensity 1 sends to points (..., 3): direction times irradiance, (..., 3).
 
     That is ``cos^mu / r^2`` along the unit vector to the light; cos is taken from the light's axis, a unit vector
@@ -133,5 +131,5 @@ def near_vectors(
     sent = distance_m**-2
     if axis is not None and anisotropy:
         sent = sent * np.maximum(-(towards @ axis), LEAST_COSINE)[..., None] ** anisotropy
-    vectors: FloatArray = towards * sent
+    vectors: Doubles = towards * sent
     return vectors

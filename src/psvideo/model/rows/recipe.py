@@ -15,13 +15,11 @@ small and negative.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles, Flags
+from psvideo.model.camera import Camera
 from psvideo.model.rows.shutter import Pulse, frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-
-Flags = NDArray[np.bool_]
 
 WHOLE = 1.0 - 1e-9
 """A row that saw this share of a square flash saw all of it."""
@@ -54,13 +52,13 @@ class FlashRecipe:
     """
 
     frames: tuple[int, ...]
-    coefficients: FloatArray
+    coefficients: Doubles
     seen: Flags
 
     @property
-    def exposures(self) -> FloatArray:
+    def exposures(self) -> Doubles:
         """How many exposures' worth of ambient light the plate holds, shape (row,)."""
-        total: FloatArray = self.coefficients.sum(axis=0)
+        total: Doubles = self.coefficients.sum(axis=0)
         return total
 
 
@@ -102,7 +100,7 @@ def _around(timing: Timing, flash: Flash) -> tuple[Flash, ...]:
     return timing.flashes[max(flash.index - NEIGHBOURS, 0) : flash.index + NEIGHBOURS + 1]
 
 
-def _times(flashes: tuple[Flash, ...]) -> tuple[FloatArray, FloatArray]:
+def _times(flashes: tuple[Flash, ...]) -> tuple[Doubles, Doubles]:
     return np.array([one.start_s for one in flashes]), np.array([one.duration_s for one in flashes])
 
 
@@ -110,7 +108,7 @@ def _whole(pulse: Pulse) -> float:
     return WHOLE_BUT_TAIL if pulse.fall_s > 0 else WHOLE
 
 
-def _separated(weights: FloatArray, *, whole: float, dark: bool) -> tuple[FloatArray, Flags]:
+def _separated(weights: Doubles, *, whole: float, dark: bool) -> tuple[Doubles, Flags]:
     """Return the coefficients (frame, row) of the first of the flashes, and which rows are seen.
 
     ``weights`` is (flash, frame, row). Where a neighbour cannot be taken off, or only at the price of noise, the frames
@@ -128,9 +126,7 @@ def _separated(weights: FloatArray, *, whole: float, dark: bool) -> tuple[FloatA
     return own, np.asarray(own.any(axis=0))
 
 
-def _first(
-    weights: FloatArray, flash: int, *, whole: float, dark: bool, most_foreign: float = MOST_FOREIGN
-) -> FloatArray:
+def _first(weights: Doubles, flash: int, *, whole: float, dark: bool, most_foreign: float = MOST_FOREIGN) -> Doubles:
     """Return a flash's coefficients (frame, row) as if there were no other: one whole frame alone, else all that saw
     any; of a dark slot the mean of the exposures that fell into it."""
     foreign = weights.sum(axis=0) - weights[flash]
@@ -138,17 +134,17 @@ def _first(
     if dark:
         clean = (seen > 0) & (foreign <= CLEAN)
         used = np.where(clean.any(axis=0), clean, seen > 0)
-        mean: FloatArray = used / np.maximum(used.sum(axis=0), 1)
+        mean: Doubles = used / np.maximum(used.sum(axis=0), 1)
         return mean
     full = seen >= whole
     alone = full & (np.cumsum(full, axis=0) == 1)
     used = np.where(full.any(axis=0), alone, seen > 0)
     share = (seen * used).sum(axis=0)
-    coefficients: FloatArray = used * np.where(share >= LEAST_SHARE, 1.0 / np.maximum(share, LEAST_SHARE), 0.0)
+    coefficients: Doubles = used * np.where(share >= LEAST_SHARE, 1.0 / np.maximum(share, LEAST_SHARE), 0.0)
     return coefficients
 
 
-def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[FloatArray, Flags]:
+def _taken_off(first: Doubles, weights: Doubles, *, dark: bool) -> tuple[Doubles, Flags]:
     """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where they can be.
 
     A flash of which no frame there saw enough cannot be taken off where it reaches into the sum.
@@ -163,5 +159,5 @@ def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[F
     separable = np.abs(np.linalg.det(matrix)) > LEAST_DETERMINANT
     matrix[~separable] = np.eye(len(weights))
     inverse = np.linalg.inv(matrix)
-    own: FloatArray = np.einsum("rj,jfr->fr", inverse[:, 0, :], first)
+    own: Doubles = np.einsum("rj,jfr->fr", inverse[:, 0, :], first)
     return own, kept & separable

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 MOST_SWING = 0.9
 
@@ -14,13 +14,13 @@ MOST_SWING = 0.9
 class Exposures:
     """Whose exposures went into a plate's rows: ``shares`` and ``middles_s`` (frame, row)."""
 
-    shares: FloatArray
-    middles_s: FloatArray
+    shares: Doubles
+    middles_s: Doubles
 
     @property
-    def middle_s(self) -> FloatArray:
+    def middle_s(self) -> Doubles:
         """The mean moment of each row's exposures, shape (row,)."""
-        middle: FloatArray = (self.shares * self.middles_s).sum(axis=0) / np.maximum(self.shares.sum(axis=0), 1e-12)
+        middle: Doubles = (self.shares * self.middles_s).sum(axis=0) / np.maximum(self.shares.sum(axis=0), 1e-12)
         return middle
 
     def phasor(self, hz: float) -> NDArray[np.complex128]:
@@ -42,12 +42,12 @@ class Ripple:
     amplitude: complex
     error: float = 0.0
 
-    def swing(self, opened: Exposures) -> FloatArray:
+    def swing(self, opened: Exposures) -> Doubles:
         """Return by which factor the rows' exposures were off the mean, shape (row,)."""
         return swing(self.amplitude, opened.phasor(self.hz))
 
 
-def swing(amplitude: complex, phasor: NDArray[np.complex128]) -> FloatArray:
+def swing(amplitude: complex, phasor: NDArray[np.complex128]) -> Doubles:
     """Return by which factor exposures were off the mean that lie at ``phasor`` (row,) in a pulse; never near 0."""
-    factor: FloatArray = np.maximum(1 + (amplitude * phasor).real, 1 - MOST_SWING)
+    factor: Doubles = np.maximum(1 + (amplitude * phasor).real, 1 - MOST_SWING)
     return factor

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import REORDERED
-from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Coded, CodedFrame, Image
+from psvideo.model.arrays import Doubles, Image
+from psvideo.model.coded import Coded, CodedFrame
 from psvideo.model.rows.clipping import SATURATED
 
 LOST = 1.0
 """Light, as a share of saturation, that a clipped sample may well have lost: one that two lights clip loses as much."""
 
 
-def collect(frames: Iterable[CodedFrame]) -> tuple[NDArray[np.int64], FloatArray]:
+def collect(frames: Iterable[CodedFrame]) -> tuple[NDArray[np.int64], Doubles]:
     """Return the frames' indices, shape (frame,), and their profiles, shape (frame, row)."""
     index, profiles, _ = collect_with_doubt(frames)
     return index, profiles
@@ -22,13 +22,13 @@ def collect(frames: Iterable[CodedFrame]) -> tuple[NDArray[np.int64], FloatArray
 
 def collect_with_doubt(
     frames: Iterable[CodedFrame],
-) -> tuple[NDArray[np.int64], FloatArray, NDArray[np.float32] | None]:
+) -> tuple[NDArray[np.int64], Doubles, NDArray[np.float32] | None]:
     """Return the frames' indices and profiles, and by how much every row mean (frame, row) may be wrong.
 
     Pixels that saturate lose an unknown amount of light; the doubt is None where none did.
     """
     indices: list[int] = []
-    profiles: list[FloatArray] = []
+    profiles: list[Doubles] = []
     doubts: list[NDArray[np.float32]] = []
     for frame in frames:
         mean, clipped = row_light(frame.coded)
@@ -39,7 +39,7 @@ def collect_with_doubt(
     return np.array(indices, np.int64), np.array(profiles, np.float64), doubt if doubt.any() else None
 
 
-def row_light(picture: Coded) -> tuple[FloatArray, FloatArray]:
+def row_light(picture: Coded) -> tuple[Doubles, Doubles]:
     """Return the mean light of every row of a picture in codes, and the share of its samples that clip, (row,) each."""
     rows, tone = picture.shape[0], picture.tone
     mean, clipped = np.empty(rows), np.empty(rows)
@@ -52,11 +52,11 @@ def row_light(picture: Coded) -> tuple[FloatArray, FloatArray]:
 def _sum_rows(
     codes: NDArray[np.generic],
     table: Image,
-    zero: FloatArray,
-    gain: FloatArray,
+    zero: Doubles,
+    gain: Doubles,
     most: np.float32,
-    mean: FloatArray,
-    clipped: FloatArray,
+    mean: Doubles,
+    clipped: Doubles,
 ) -> None:
     """One loop over the codes; what a position's black and white levels make of their sum comes after it."""
     rows, samples = codes.shape

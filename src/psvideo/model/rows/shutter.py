@@ -10,11 +10,10 @@ together.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles, Integers
+from psvideo.model.camera import Camera
 
-IntArray = NDArray[np.int64]
 REACH = 9.0
 """After this many fall times a flash counts as over: e^-9 of its last light is left, a ten-thousandth."""
 
@@ -31,7 +30,7 @@ class Pulse:
         """How long after its drive ends a flash still gives light."""
         return REACH * self.fall_s
 
-    def given_off(self, since_s: FloatArray, duration_s: FloatArray) -> FloatArray:
+    def given_off(self, since_s: Doubles, duration_s: Doubles) -> Doubles:
         """Return the share of its light, 0 to 1, that a flash has given off ``since_s`` after its drive's start.
 
         Both are arrays that broadcast. The drive lasts ``duration_s``; the light rises as ``1 - exp(-t / rise_s)`` and
@@ -43,7 +42,7 @@ class Pulse:
         """
         lit_s, after_s = np.clip(since_s, 0.0, duration_s), np.maximum(since_s - duration_s, 0.0)
         given_s, whole_s = np.asarray(lit_s, np.float64), np.asarray(duration_s, np.float64)
-        reached: FloatArray = np.ones_like(whole_s)
+        reached: Doubles = np.ones_like(whole_s)
         if self.rise_s > 0:
             given_s = lit_s + self.rise_s * np.expm1(-lit_s / self.rise_s)
             reached = -np.expm1(-whole_s / self.rise_s)
@@ -51,7 +50,7 @@ class Pulse:
         if self.fall_s > 0:
             given_s = given_s - reached * self.fall_s * np.expm1(-after_s / self.fall_s)
             whole_s = whole_s + reached * self.fall_s
-        share: FloatArray = given_s / whole_s
+        share: Doubles = given_s / whole_s
         return share
 
 
@@ -59,8 +58,8 @@ SQUARE = Pulse()
 
 
 def row_weights(
-    camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, frames: range, pulse: Pulse = SQUARE
-) -> FloatArray:
+    camera: Camera, start_s: Doubles, duration_s: Doubles, *, frames: range, pulse: Pulse = SQUARE
+) -> Doubles:
     """Return the fraction of each flash that each row saw in each frame, shape (flash, frame, row), 0 to 1.
 
     ``start_s`` and ``duration_s`` have shape (flash,) and are on the camera's clock; ``frames`` are frame indices.
@@ -80,20 +79,20 @@ def row_weights(
     return parts[0] if len(parts) == 1 else np.mean(parts, axis=0, dtype=np.float64)
 
 
-def _seen(opens_s: FloatArray, on_s: FloatArray, length_s: FloatArray, exposure_s: float, pulse: Pulse) -> FloatArray:
+def _seen(opens_s: Doubles, on_s: Doubles, length_s: Doubles, exposure_s: float, pulse: Pulse) -> Doubles:
     """Return the share of flashes that exposures collect which begin at ``opens_s``; all broadcast."""
     if pulse != SQUARE:
         since_s = opens_s - on_s
-        seen: FloatArray = pulse.given_off(since_s + exposure_s, length_s) - pulse.given_off(since_s, length_s)
+        seen: Doubles = pulse.given_off(since_s + exposure_s, length_s) - pulse.given_off(since_s, length_s)
         return seen
     overlap_s = np.minimum(opens_s + exposure_s, on_s + length_s) - np.maximum(opens_s, on_s)
-    weights: FloatArray = np.clip(overlap_s, 0.0, None) / length_s
+    weights: Doubles = np.clip(overlap_s, 0.0, None) / length_s
     return weights
 
 
 def frames_touched(
-    camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, pulse: Pulse = SQUARE
-) -> tuple[IntArray, IntArray]:
+    camera: Camera, start_s: Doubles, duration_s: Doubles, *, pulse: Pulse = SQUARE
+) -> tuple[Integers, Integers]:
     """Return the first and the last frame of which any row sees any of each flash, each of shape (flash,).
 
     Two or three frames at 360 degrees with a long readout (§3.3), often one where the readout is short; frames before

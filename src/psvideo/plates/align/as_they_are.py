@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Flags
 from psvideo.model.rig import Light, directions
 from psvideo.plates.align.as_they_are_kernel import SOLVED, leave_rows
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.pixel_sources import Taken
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, SCALE, light_of
-from psvideo.plates.align.velocity.flow import TOE, Flags, all_of, comparable
+from psvideo.plates.align.velocity.flow import TOE, all_of, comparable
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving_kernel import AT_REST
 

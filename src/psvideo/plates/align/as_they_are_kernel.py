@@ -1,14 +1,11 @@
 """The compiled loop that asks how well one normal and one albedo explain the lights' plates, as they are and moved."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
+from psvideo.model.arrays import Codes8, Doubles, Floats
 
-Codes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-Numbers = NDArray[np.float64]
 SOLVED = 3
 """This many lights are explained by a normal and an albedo, whatever they show."""
 CLIPPED = 250
@@ -21,8 +18,8 @@ MOST = 1.0
 
 @FUSED.kept
 def leave_rows(
-    rest: Codes, moved: Codes, light: Numbers, matrix: Numbers, least: Numbers, factors: Numbers, first: int, last: int,
-    left: Floats,
+    rest: Codes8, moved: Codes8, light: Doubles, matrix: Doubles, least: Doubles, factors: Doubles, first: int,
+    last: int, left: Floats,
 ) -> None:  # fmt: skip
     """Fill rows of ``left`` (3, row, col) where plates ``rest`` and ``moved`` (light, row, col) differ; 0 elsewhere.
 

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Codes8, Flags, Floats, Image
 from psvideo.model.channels import brightest_channel
-from psvideo.model.coded import Image
 from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, blend_rows
 from psvideo.plates.align.packed import PutBy, packed
-from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST
 from psvideo.plates.light_plate import LightPlate
@@ -51,11 +50,11 @@ class Ends:
 
 def plate_at(
     ends: Ends,
-    source: Codes,
+    source: Codes8,
     motion: Followed,
     *,
     number: int,
-    guess: Codes | None = None,
+    guess: Codes8 | None = None,
     put_by: PutBy | None = None,
 ) -> LightPlate:
     """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known.
@@ -118,7 +117,7 @@ class _Side:
             within=np.ones((1, 1), np.bool_) if within.all() else within,
         )
 
-    def around(self, band: range, velocity: Vectors) -> "_Rows":
+    def around(self, band: range, velocity: Floats) -> "_Rows":
         """Return the plate's rows of a band, and those that move into it."""
         rows, high = self.plate.shape[0], self.plate.shape[0] / velocity.shape[1]
         some = velocity[1, max(int(band.start / high) - 1, 0) : int(band.stop / high) + 2]
@@ -140,7 +139,7 @@ class _Rows:
     def of(self, band: range) -> Image:
         return self.light[band.start - self.first : band.stop - self.first]
 
-    def marks(self) -> Codes:
+    def marks(self) -> Codes8:
         """Return what is clipped and what lies beside that, (row, col), or one 0 where nothing is."""
         light, full = self.light, self.side.plate.saturation
         if light.max() < full:
@@ -156,9 +155,9 @@ def _fill(
     seen: Flags,
     own: LightPlate,
     sides: Sequence[_Side | None],
-    sources: tuple[Codes, Codes],
+    sources: tuple[Codes8, Codes8],
     motion: Followed,
-    columns: tuple[NDArray[np.uintp], Vectors],
+    columns: tuple[NDArray[np.uintp], Floats],
 ) -> None:
     """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
     some, part = slice(band.start, band.stop), _part(sources, band, image.shape)
@@ -187,7 +186,7 @@ def _fill(
     )  # fmt: skip
 
 
-def columns_in(cols: int, coarse: int) -> tuple[NDArray[np.uintp], Vectors]:
+def columns_in(cols: int, coarse: int) -> tuple[NDArray[np.uintp], Floats]:
     """Return for every column of a picture the coarse ones before it and in which it lies, (2, col), and how far it
     lies beyond the middle of the former."""
     place = (np.arange(cols, dtype=np.float32) + HALF) * np.float32(coarse / cols)
@@ -208,7 +207,7 @@ def _flat(image: Image) -> Image:
     return image.reshape(*image.shape[:2], _channels(image))
 
 
-def _part(sources: tuple[Codes, Codes], band: range, shape: tuple[int, ...]) -> range:
+def _part(sources: tuple[Codes8, Codes8], band: range, shape: tuple[int, ...]) -> range:
     """Return the columns of a band between which anything is not as the nearer plate has it."""
     small_rows, small_cols = sources[0].shape
     high = shape[0] / small_rows

@@ -8,12 +8,9 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.cubic import cubic_of_one, cubic_of_three, cubic_weights
 from psvideo.compute.memory import lent
+from psvideo.model.arrays import Codes8, Flags, Floats, Places
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, NOWHERE
 
-Codes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-Flags = NDArray[np.bool_]
-Places = NDArray[np.intp]
 Columns = NDArray[np.uintp]
 ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)
 JUST_BELOW = np.float32(1 - 1e-4)
@@ -88,7 +85,7 @@ def _between(light: Floats, address: int, x: np.float32, y: np.float32) -> tuple
 
 @FUSED.inlined
 def _moved(
-    light: Floats, address: int, marks: Codes, full: np.float32, x: np.float32, y: np.float32
+    light: Floats, address: int, marks: Codes8, full: np.float32, x: np.float32, y: np.float32
 ) -> tuple[np.float32, np.float32, np.float32]:
     """A plate's light at a place of its own.
 
@@ -114,9 +111,9 @@ def _clips(light: tuple[np.float32, np.float32, np.float32], full: np.float32) -
 
 @FUSED.kept
 def blend_rows(
-    source: Codes, guess: Codes, velocity: Floats, spans_s: Floats, shape: tuple[int, int], first: int, left: int,
+    source: Codes8, guess: Codes8, velocity: Floats, spans_s: Floats, shape: tuple[int, int], first: int, left: int,
     right: int, places: Columns, shares: Floats, lines: Floats, before: Floats, after: Floats, firsts: Places,
-    marks_before: Codes, marks_after: Codes, seen_before: Flags, seen_after: Flags, counts: Floats, full: Floats,
+    marks_before: Codes8, marks_after: Codes8, seen_before: Flags, seen_after: Flags, counts: Floats, full: Floats,
     rows_seen: Flags, stays: Floats, image: Floats, seen: Flags,
 ) -> None:  # fmt: skip
     """Fill ``image`` (row, col, channel), the rows of a picture of a ``shape`` (row, col) from its row ``first`` on,

@@ -8,14 +8,11 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile, rising_parts
+from psvideo.model.arrays import Flags, Floats
 from psvideo.model.surface import Surface
 from psvideo.plates.align.velocity.followed import mean_over
-
-Planes = NDArray[np.float32]
-Flags = NDArray[np.bool_]
 
 WINDOW_PX = 5
 MOST_CHANGE = 2.0
@@ -34,9 +31,9 @@ quarter's border as a share of the mean, for three normal components (chi square
 class Average:
     """``vectors`` (3, row, col) are albedo * normal, ``albedo`` (channel, row, col), ``count`` (row, col) results."""
 
-    vectors: Planes
-    albedo: Planes
-    count: Planes
+    vectors: Floats
+    albedo: Floats
+    count: Floats
 
 
 def averaged(before: Average | None, surface: Surface, results: int) -> tuple[Average, Surface]:
@@ -88,7 +85,7 @@ def _alike(before: Average, now: Average, both: Flags) -> Flags:
     return np.asarray(both & (each <= MOST_CHANGE * expected) & (whole <= MOST_DRIFT * expected))
 
 
-def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
+def _noise(apart: Floats, level: Floats, both: Flags) -> Floats:
     """Return the mean squared noise of one result by brightness; ``apart`` (3, row, col) is what differs in time.
 
     Only its finest detail is looked at (Immerkaer, "Fast noise variance estimation", CVIU 1996), which smooth surfaces

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.brightness import evened
-from psvideo.plates.align.velocity.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
+from psvideo.plates.align.velocity.flow import Sketch, changed, sketch_of, white_of
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS
@@ -58,7 +59,7 @@ class DueInstant:
     made: dict[str, LightPlate] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
     motion: Followed | None = None
-    unsure: Vectors | None = None
+    unsure: Floats | None = None
     guessed: bool = False
 
 

@@ -12,7 +12,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Image
 from psvideo.plates.align.comb import SAMPLES
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of

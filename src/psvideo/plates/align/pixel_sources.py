@@ -12,12 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.doubt.evenly import EACH_PX, evenly_changed
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.velocity.all_lights import SHADING_PX
 from psvideo.plates.align.velocity.brightness import light_of
-from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors, comparable, noise_between, pixel_places
+from psvideo.plates.align.velocity.flow import comparable, noise_between, pixel_places
 from psvideo.plates.align.velocity.followed import Followed, Pair, odd_width
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
 
@@ -61,8 +62,8 @@ class Taken:
 
     alike: Flags
     sure: Flags
-    source: Codes
-    unsure: Vectors
+    source: Codes8
+    unsure: Floats
     shows: InstantSketch
 
 
@@ -75,12 +76,12 @@ class Compared:
     ``shaded``: one is in shadow. ``window`` is the size of a shading's window in pixels of the grid.
     """
 
-    before: Codes
-    after: Codes
-    apart: Vectors
-    shading: Vectors
-    own_shading: Vectors
-    own_unlike: Vectors
+    before: Codes8
+    after: Codes8
+    apart: Floats
+    shading: Floats
+    own_shading: Floats
+    own_unlike: Floats
     evenly: Flags
     own_evenly: Flags
     shaded: Flags
@@ -117,7 +118,7 @@ def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
     )
 
 
-def _compared(pair: Pair, ways: tuple[Vectors, Vectors], step: int) -> Compared:
+def _compared(pair: Pair, ways: tuple[Floats, Floats], step: int) -> Compared:
     """Return a light's plates brought to the instant along ``ways``, and by how much they differ there."""
     both = comparable(pair.before, pair.after)
     before, after = (_along(codes, way) for codes, way in zip(both, ways, strict=True))
@@ -140,7 +141,7 @@ def _compared(pair: Pair, ways: tuple[Vectors, Vectors], step: int) -> Compared:
     )
 
 
-def _shown_by(plates: Compared, motion: Followed, *, nearer: int, guessed: bool) -> Codes:
+def _shown_by(plates: Compared, motion: Followed, *, nearer: int, guessed: bool) -> Codes8:
     """Return which plate shows each pixel, as if nothing were hidden in either."""
     detail = np.where(plates.own_unlike < np.float32(TURNED**2), BOTH, nearer)
     source = np.where(motion.moves, detail, AT_REST).astype(np.uint8)
@@ -165,13 +166,13 @@ def _turns(plates: Compared, still: Flags) -> Flags:
     return np.asarray(np.abs(changes) > np.float32(REST))
 
 
-def _alike(shading: Vectors, unlike: Vectors) -> Flags:
+def _alike(shading: Floats, unlike: Floats) -> Flags:
     """Return where plates show the same: by how much they differ as a whole, and the square of what their detail
     does."""
     return np.asarray(unlike < np.where(np.abs(shading) < EVENLY, np.float32(UNLIKE**2), np.float32(BARE**2)))
 
 
-def _shown(before: Codes, after: Codes, source: Codes, spans_s: tuple[float, float]) -> Codes:
+def _shown(before: Codes8, after: Codes8, source: Codes8, spans_s: tuple[float, float]) -> Codes8:
     """Return the sketch of what is taken of two plates, moved to the instant."""
     share = float(np.clip(spans_s[0] / (spans_s[0] + spans_s[1]), 0, 1))
     nearer = before if spans_s[0] <= spans_s[1] else after
@@ -180,7 +181,7 @@ def _shown(before: Codes, after: Codes, source: Codes, spans_s: tuple[float, flo
     return np.asarray(np.where(source == AFTER, after, shown), np.uint8)
 
 
-def _off_of_blend(plates: Compared, alike: Flags) -> Vectors:
+def _off_of_blend(plates: Compared, alike: Flags) -> Floats:
     """Return by which share of what two plates differ their blend may be off, ``alike`` where they show the same."""
     unlike = np.maximum(plates.own_unlike, np.float32(0))  # sums that run along rows round
     level = plates.own_shading * plates.own_shading
@@ -190,7 +191,7 @@ def _off_of_blend(plates: Compared, alike: Flags) -> Vectors:
     return np.asarray(np.where(plain & ~alike, BLENDED_UNLIKE, np.sqrt(squares)), np.float32)
 
 
-def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> tuple[list[Codes], Flags]:
+def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> tuple[list[Codes8], Flags]:
     """Return the sources of all lights under which something moves, without what is doubtful where enough is sure; and
     where nothing is known, though it is shown as it is: more than half of many lights show that something moved, and no
     motion explains it.
@@ -206,20 +207,20 @@ def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> t
     return [np.where(left_out & ~one.sure, np.uint8(NOWHERE), one.source) for one in shown], unknown
 
 
-def _shaded(before: Codes, after: Codes, window: tuple[int, int]) -> Flags:
+def _shaded(before: Codes8, after: Codes8, window: tuple[int, int]) -> Flags:
     """Return where one of two plates is in shadow as a whole."""
     one, other = (light_of(cv2.blur(codes, window).astype(np.float32)) for codes in (before, after))
     return np.asarray(np.minimum(one, other) < np.float32(SHADED) * np.maximum(one, other) - np.float32(DARK))
 
 
-def _along(codes: Codes, way: Vectors) -> Codes:
+def _along(codes: Codes8, way: Floats) -> Codes8:
     x, y = pixel_places(*way.shape[1:])
     high, wide = (np.float32(many / few) for many, few in zip(codes.shape, way.shape[1:], strict=True))
     x, y = (x - way[0] + HALF) * wide - HALF, (y - way[1] + HALF) * high - HALF
     return np.asarray(cv2.remap(codes, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
-def _outside(way: Vectors) -> Flags:
+def _outside(way: Floats) -> Flags:
     rows, cols = way.shape[1:]
     x, y = pixel_places(rows, cols)
     x, y = x - way[0], y - way[1]
@@ -241,7 +242,7 @@ def _add_hidden(hidden: Flags, motion: Followed, alike: Flags, span_s: float, ro
 
 
 def _places_from(
-    rows: NDArray[np.intp], cols: NDArray[np.intp], way: Vectors, shape: tuple[int, ...]
+    rows: NDArray[np.intp], cols: NDArray[np.intp], way: Floats, shape: tuple[int, ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     row, col = np.rint(rows + way[1]).astype(np.intp), np.rint(cols + way[0]).astype(np.intp)
     return np.clip(row, 0, shape[0] - 1), np.clip(col, 0, shape[1] - 1)

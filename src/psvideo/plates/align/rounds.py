@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.model.choices import Align, Rate
 from psvideo.model.rig import Light
 from psvideo.plates.align.as_they_are import (
@@ -27,7 +28,6 @@ from psvideo.plates.align.light_history import Around, DueInstant, Held
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
 from psvideo.plates.align.velocity.brightness import evened
-from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.align.velocity.moving_kernel import NOWHERE
@@ -227,7 +227,7 @@ def _fitting_as_they_are(held: Held, instant: DueInstant, pairs: dict[str, Pair]
     return fits_as_it_is(held.lamps, both) & seen_by_all([*pairs.values()], motion)
 
 
-def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes]) -> Vectors:
+def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes8]) -> Floats:
     """Return by how much every light's plate may be off, (light, row, col): where its two plates disagree, and where
     the lights do; what is left out is not."""
     moves = np.zeros(sources[0].shape, np.bool_) if instant.motion is None else instant.motion.moves
@@ -247,7 +247,7 @@ def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: S
     return unsure
 
 
-def _moved_to(around: Around, source: Codes, guess: Codes, motion: Followed, put_by: PutBy | None) -> LightPlate:
+def _moved_to(around: Around, source: Codes8, guess: Codes8, motion: Followed, put_by: PutBy | None) -> LightPlate:
     before, after = around.before, around.after
     share = (motion.time_s - before.time_s) / (after.time_s - before.time_s)
     ends = Ends(before=before.plate, after=after.plate, share=share)

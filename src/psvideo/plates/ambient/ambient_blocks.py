@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Image
 
 BLOCKS_PX = ((100, 2), (600, 4))
 """Levels are compared over blocks of this many pixels a side from pictures of this many rows and columns on; those of

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile, rising_parts
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Image
 from psvideo.plates.ambient.ambient_blocks import times_rows
 
 LEVEL_SIGMA_PX = {1: 4.0, 2: 8.0, 4: 8.0}

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Doubles, Image
 from psvideo.model.rows.ripple import Ripple
 from psvideo.plates.ambient.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient.ambient_change import AmbientChange
@@ -39,7 +38,7 @@ class Ambient:
     level: AmbientLevel
     coarse: Image
     slots: Image
-    middle_s: FloatArray
+    middle_s: Doubles
     known: NDArray[np.bool_]
     mains: Mains
     index: int
@@ -82,15 +81,15 @@ def update(ambient: Ambient | None, dark: Plate, *, ripple: Ripple | None = None
     )
 
 
-def _freeing(ripple: Ripple | None, rows: RowLight) -> FloatArray:
+def _freeing(ripple: Ripple | None, rows: RowLight) -> Doubles:
     """Return by which factor a dark slot's rows are freed of a ripple, shape (row,)."""
     return np.ones(len(rows.mean)) if ripple is None else 1 / ripple.swing(rows.opened)
 
 
-def _over_blocks(factor: FloatArray, count: int) -> FloatArray:
+def _over_blocks(factor: Doubles, count: int) -> Doubles:
     """Return the means of rows' factors over ``count`` blocks of rows."""
     blocks = block_rows(len(factor), count)
-    means: FloatArray = np.bincount(blocks, factor) / np.bincount(blocks)
+    means: Doubles = np.bincount(blocks, factor) / np.bincount(blocks)
     return means
 
 
@@ -108,7 +107,7 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
 
 
 def _blended(
-    ambient: Ambient, dark: Plate, gain: Image, restarts: NDArray[np.bool_], factor: FloatArray
+    ambient: Ambient, dark: Plate, gain: Image, restarts: NDArray[np.bool_], factor: Doubles
 ) -> tuple[AmbientLevel, Image, Image]:
     """Return the average with one more dark slot, its rows times a factor; its mean over blocks; and how many slots it
     spans then."""

@@ -4,25 +4,22 @@ A row stays in a core's first cache meanwhile; no picture is held except the ave
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED, REORDERED
 from psvideo.compute.memory import lent
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Codes16, Doubles, Flags, Floats, Indices
 from psvideo.plates.ambient.ambient_level import pack_row, unpack_row
 from psvideo.plates.mixing.mixing_kernel import mix_row
-from psvideo.plates.mixing.mixture_arrays import Codes, Floats, MixtureArrays, lent_mix
+from psvideo.plates.mixing.mixture_arrays import MixtureArrays, lent_mix
 
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.uint32]
-Planes = tuple[Codes, Floats, Floats, Floats]
+Planes = tuple[Codes16, Floats, Floats, Floats]
 """Of an AmbientLevel."""
 ONE, HALF = np.float32(1), np.float32(0.5)
 
 
 @FUSED.kept
 def measure_rows(
-    mix: MixtureArrays, block: int, first: int, last: int, means: FloatArray, clipped: Flags, coarse: Floats
+    mix: MixtureArrays, block: int, first: int, last: int, means: Doubles, clipped: Flags, coarse: Floats
 ) -> None:
     """Fill of some rows of a picture, whole rows of blocks, the ``means`` (row,) and whether any sample is ``clipped``
     (row,), and the means over blocks of this many pixels a side, ``coarse`` (row, col, channel) of blocks."""

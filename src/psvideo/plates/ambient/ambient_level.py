@@ -7,16 +7,15 @@ last bit of a 16-bit code, and what reading it costs beside every plate is halve
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
-from psvideo.model.coded import Coded, Image, Tone
+from psvideo.model.arrays import Codes16, Image
+from psvideo.model.coded import Coded, Tone
 
 MOST_CODE = np.float32(65535)
 TINY = np.float32(1e-12)
 HALF, SIXTH = np.float32(0.5), np.float32(1 / 6)
-Codes = NDArray[np.uint16]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,7 +25,7 @@ class AmbientLevel:
     narrow: (row, col // 2), its mean over two columns each and over channels.
     """
 
-    codes: Codes
+    codes: Codes16
     least: Image
     step: Image
     narrow: Image
@@ -55,7 +54,7 @@ class AmbientLevel:
         return int(np.prod(self.codes.shape[2:]))
 
     @property
-    def planes(self) -> tuple[Codes, Image, Image, Image]:
+    def planes(self) -> tuple[Codes16, Image, Image, Image]:
         """The codes as (row, sample), and what else is known of rows, as compiled loops take them."""
         return self.codes.reshape(len(self.codes), -1), self.least, self.step, self.narrow
 
@@ -67,7 +66,7 @@ class AmbientLevel:
 
 
 @FUSED.kept
-def pack_rows(light: Image, codes: Codes, least: Image, step: Image, narrow: Image, channels: int) -> None:
+def pack_rows(light: Image, codes: Codes16, least: Image, step: Image, narrow: Image, channels: int) -> None:
     """Pack every row of ``light`` (row, sample)."""
     given, out, low, high, grey = lent(light), lent(codes), lent(least), lent(step), lent(narrow)
     for row in range(given.shape[0]):
@@ -75,7 +74,7 @@ def pack_rows(light: Image, codes: Codes, least: Image, step: Image, narrow: Ima
 
 
 @FUSED.inlined
-def pack_row(line: Image, codes: Codes, least: Image, step: Image, narrow: Image, row: int, channels: int) -> None:
+def pack_row(line: Image, codes: Codes16, least: Image, step: Image, narrow: Image, row: int, channels: int) -> None:
     """Pack one row of light, ``line`` (sample,); ``least`` and ``step`` are those of all rows."""
     low, high = _ends(line)
     one = max((high - low) / MOST_CODE, TINY)
@@ -113,7 +112,7 @@ def _ends(line: Image) -> tuple[np.float32, np.float32]:
 
 
 @FUSED.inlined
-def unpack_row(codes: Codes, least: np.float32, step: np.float32, line: Image) -> None:
+def unpack_row(codes: Codes16, least: np.float32, step: np.float32, line: Image) -> None:
     """Fill ``line`` with the light of a row."""
     for sample in range(line.shape[0]):
         line[sample] = least + step * np.float32(codes[sample])

@@ -14,18 +14,15 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile, rising_parts
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles, Flags, Image
+from psvideo.model.camera import Camera
 from psvideo.model.channels import mean_of_channels
 from psvideo.model.plan import Plan
 from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
-
-Image = NDArray[np.float32]
-Flags = NDArray[np.bool_]
 
 WINDOW_FRAMES = 128
 """Frames that one regression takes together: enough for plates within a few per cent of the best."""
@@ -60,8 +57,8 @@ class Design:
     """
 
     frames: tuple[int, ...]
-    shares: FloatArray
-    takes: FloatArray
+    shares: Doubles
+    takes: Doubles
     known: Flags
 
 
@@ -109,14 +106,14 @@ def design_of(plan: Plan, camera: Camera, timing: Timing, frames: Iterable[int])
     return Design(frames=numbers, shares=shares, takes=takes, known=known)
 
 
-def _takes(shares: FloatArray) -> tuple[FloatArray, Flags]:
+def _takes(shares: Doubles) -> tuple[Doubles, Flags]:
     """Return the weights (frame, row) of the regression's constant, and the rows where they give it."""
     trust = 1.0 / (TRUSTS_DIM + shares.sum(axis=0))
     terms = np.concatenate([np.ones((1, *shares.shape[1:])), shares])
     equations = np.einsum("anr,nr,bnr->rab", terms, trust, terms)
     scale = np.trace(equations, axis1=1, axis2=2)[:, None, None]
     inverse = np.linalg.inv(equations + 1e-9 * scale * np.eye(len(terms)))
-    takes: FloatArray = np.einsum("rb,bnr->nr", inverse[:, 0, :], terms) * trust
+    takes: Doubles = np.einsum("rb,bnr->nr", inverse[:, 0, :], terms) * trust
     kept = np.einsum("nr,bnr->br", takes, terms)  # 1 of the ambient light and 0 of every flash, where they are known
     kept[0] -= 1
     known: Flags = np.asarray(((takes**2).sum(axis=0) <= MOST_NOISE) & (np.abs(kept).max(axis=0) <= MOST_KEPT))

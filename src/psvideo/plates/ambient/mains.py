@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rows.ripple import MOST_SWING, Exposures, Ripple, swing
 from psvideo.plates.split import Plate
 
@@ -39,12 +39,12 @@ class RowLight:
     """The rows of a plate: their means (row,), and whose exposures went into them, ``opened``. ``good`` (row,) is False
     where a row was not seen, holds no light or is clipped."""
 
-    mean: FloatArray
+    mean: Doubles
     opened: Exposures
     good: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, plate: Plate, mean: FloatArray, clipped: NDArray[np.bool_]) -> "RowLight":
+    def of(cls, plate: Plate, mean: Doubles, clipped: NDArray[np.bool_]) -> "RowLight":
         """Return the rows of a plate that still holds its ambient light, of their means and which are clipped."""
         good = plate.seen & (mean > 0) & ~clipped
         return cls(mean=mean, opened=Exposures(shares=plate.shares, middles_s=plate.middles_s), good=good)
@@ -104,8 +104,8 @@ def _fitted(
     after: RowLight,
     hz: float,
     good: NDArray[np.bool_],
-    change: FloatArray,
-    weight: FloatArray,
+    change: Doubles,
+    weight: Doubles,
 ) -> tuple[float, Ripple] | None:
     """Fit one change of level and one ripple (Gauss-Newton); return the share of the change explained, and it."""
     early, late = before.opened.phasor(hz)[good], after.opened.phasor(hz)[good]

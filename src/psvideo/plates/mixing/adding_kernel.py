@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded
 from psvideo.compute.parts import INLINED
-from psvideo.plates.mixing.mixture_arrays import Codes, Floats, MixtureArrays
+from psvideo.model.arrays import Codes16, Floats
+from psvideo.plates.mixing.mixture_arrays import MixtureArrays
 
 
 def some_reach(codes: NDArray[Any], limit: np.float32, most: np.float32) -> bool:
@@ -111,7 +112,7 @@ def begin_linear(codes: NDArray[Any], zero: np.float32, scale: np.float32, most:
 
 @FUSED.inlined
 def begin_with_level(
-    codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, level: Codes, share: np.float32,
+    codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, level: Codes16, share: np.float32,
     least: np.float32, out: Floats,
 ) -> None:  # fmt: skip
     """The same, and take an ambient level off: its codes times ``share``, and ``least``."""
@@ -128,7 +129,7 @@ def add_linear(codes: NDArray[Any], zero: np.float32, scale: np.float32, most: n
 
 
 @FUSED.inlined
-def take_off(level: Codes, share: np.float32, least: np.float32, out: Floats) -> None:
+def take_off(level: Codes16, share: np.float32, least: np.float32, out: Floats) -> None:
     """Take an ambient level off a row: its codes times ``share``, and ``least``."""
     for sample in range(out.shape[0]):
         out[sample] = out[sample] - least - share * np.float32(level[sample])

@@ -7,6 +7,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
+from psvideo.model.arrays import Floats, Places
 from psvideo.plates.mixing.adding_kernel import (
     add_by_table,
     add_halves,
@@ -18,7 +19,7 @@ from psvideo.plates.mixing.adding_kernel import (
     some_reach,
     take_off,
 )
-from psvideo.plates.mixing.mixture_arrays import Floats, MixtureArrays, Places, lent_mix, level_row, row_of
+from psvideo.plates.mixing.mixture_arrays import MixtureArrays, lent_mix, level_row, row_of
 
 NOTHING, WHOLE, CLIPPED = range(3)
 

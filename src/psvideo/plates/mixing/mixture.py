@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.camera import FloatArray
-from psvideo.model.coded import IDENTITY, Coded, Image
+from psvideo.model.arrays import Doubles, Image
+from psvideo.model.coded import IDENTITY, Coded
 from psvideo.model.rows.clipping import SATURATED
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing.mixing_kernel import COUNTS, mix_rows
@@ -46,9 +46,9 @@ class Mixture:
     """
 
     frames: tuple[Coded, ...]
-    coefficients: FloatArray
+    coefficients: Doubles
     levels: tuple[AmbientLevel, ...] = ()
-    taken: FloatArray | None = None
+    taken: Doubles | None = None
     ceiling: float = 1.0
     clips_from: float = SATURATED
 
@@ -121,7 +121,7 @@ class Mixture:
         _in_bands(band, rows, 2 * bound.mix.samples)
         return grey
 
-    def without(self, levels: tuple[AmbientLevel, ...], taken: FloatArray) -> "Mixture":
+    def without(self, levels: tuple[AmbientLevel, ...], taken: Doubles) -> "Mixture":
         """Return the picture with levels taken off, each row with its own share; ``taken`` is (level, row)."""
         return replace(self, levels=(*self.levels, *levels), taken=_joined(self.taken, taken))
 
@@ -205,7 +205,7 @@ def _rows_of(levels: Sequence[Image], rows: int) -> Image:
     return np.stack(levels) if levels else np.zeros((0, rows), np.float32)
 
 
-def _joined(before: FloatArray | None, more: FloatArray) -> FloatArray:
+def _joined(before: Doubles | None, more: Doubles) -> Doubles:
     return more if before is None else np.concatenate([before, more])
 
 

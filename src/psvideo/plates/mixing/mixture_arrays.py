@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent, pointer, read_at
+from psvideo.model.arrays import Codes16, Floats, Places
 
-Floats = NDArray[np.float32]
-Places = NDArray[np.intp]
-Codes = NDArray[np.uint16]
 EMPTY = np.empty(0, np.uint16)
 
 
@@ -103,8 +101,8 @@ def _read(files: InFiles, opened: int, begin: int, size: int) -> None:
 
 
 @FUSED.inlined
-def level_row(mix: MixtureArrays, level: int, row: int) -> Codes:
+def level_row(mix: MixtureArrays, level: int, row: int) -> Codes16:
     """A row of a level in its codes."""
     end = (row + 1) * mix.samples
-    codes: Codes = carray(pointer(mix.levels[level], EMPTY), end)
+    codes: Codes16 = carray(pointer(mix.levels[level], EMPTY), end)
     return codes[row * mix.samples : end]

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Coded, Image
+from psvideo.model.arrays import Doubles, Image
+from psvideo.model.coded import Coded
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing.mixing_kernel import mix_pictures
 from psvideo.plates.mixing.mixture import Mixture
@@ -39,8 +39,8 @@ class _Parts:
 
     frames: tuple[Coded, ...]
     levels: tuple[AmbientLevel, ...]
-    shares: FloatArray
-    taken: FloatArray
+    shares: Doubles
+    taken: Doubles
 
     @classmethod
     def of(cls, pictures: Sequence[Mixture]) -> "_Parts":

@@ -7,17 +7,10 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent, pointer
+from psvideo.model.arrays import Floats
 from psvideo.plates.mixing.adding_kernel import some_reach
 from psvideo.plates.mixing.mixing_kernel import CLIPPED, WHOLE, mix_row
-from psvideo.plates.mixing.mixture_arrays import (
-    Floats,
-    InFiles,
-    MixtureArrays,
-    lent_mix,
-    level_row,
-    row_of,
-    two_rows_of,
-)
+from psvideo.plates.mixing.mixture_arrays import InFiles, MixtureArrays, lent_mix, level_row, row_of, two_rows_of
 
 ZERO, HALF = np.float32(0), np.float32(0.5)
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Bytes
 from psvideo.plates.light_plate import LightPlate
 
-Filled = NDArray[np.uint8]
 FULL, NEARLY_FULL = 2, 1
 NEARLY_CLIPPED = 0.45
 """What is clipped in one round shows at least this share of saturation in the next: half, where two frames share the
@@ -19,7 +19,7 @@ flash, less noise."""
 ROWS_AT_ONCE = 256
 
 
-def filled_of(plate: LightPlate, rows: range) -> Filled | None:
+def filled_of(plate: LightPlate, rows: range) -> Bytes | None:
     """Return what is ``FULL`` in some rows of a plate, and ``NEARLY_FULL`` where it may be in another round, shape
     (row, col); None where every value is light."""
     if not plate.unmixed:
@@ -31,7 +31,7 @@ def filled_of(plate: LightPlate, rows: range) -> Filled | None:
     return np.where(_at_ceiling(plate, rows), FULL, np.where(nearly, NEARLY_FULL, 0)).astype(np.uint8)
 
 
-def vague_between(before: Filled | None, after: Filled | None) -> NDArray[np.bool_] | None:
+def vague_between(before: Bytes | None, after: Bytes | None) -> NDArray[np.bool_] | None:
     """Return where one of two rounds says nothing, as the other may as well, (row, col); None where both always speak.
 
     Where one says nothing and the other is far from clipped, something changed.
@@ -41,7 +41,7 @@ def vague_between(before: Filled | None, after: Filled | None) -> NDArray[np.boo
     return np.asarray((np.minimum(before, after) >= NEARLY_FULL) & (np.maximum(before, after) == FULL))
 
 
-def coarser(filled: Filled | None, rows: int, cols: int) -> Filled | None:
+def coarser(filled: Bytes | None, rows: int, cols: int) -> Bytes | None:
     """Return the fullest of every ``rows`` by ``cols`` pixels; what is left over at the ends goes.
 
     >>> coarser(np.array([[0, 1, 2, 0, 2]], np.uint8), 1, 2)

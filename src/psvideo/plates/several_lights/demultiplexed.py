@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
@@ -61,7 +61,7 @@ def plate_of_light(making: Making, lit: dict[int, Plate], number: int) -> LightP
     return _mixed(parts, np.array(list(making.shares.values())), making.light, number)
 
 
-def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) -> LightPlate:
+def _merged(parts: list[Plate], exposures: Doubles, light: str, number: int) -> LightPlate:
     """Merge flashes of one light alone; ``exposures`` (part,) are their shares of its full flash.
 
     The sum of what is not clipped over the sum of its exposures is the best estimate under photon noise. Where all is
@@ -89,7 +89,7 @@ def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) 
     )
 
 
-def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> LightPlate:
+def _mixed(parts: list[Plate], shares: Doubles, light: str, number: int) -> LightPlate:
     """Take a light out of patterns of several; ``shares`` (part,) are what of each pattern makes up the light."""
     saturation = max(float(shares[shares > 0].sum()), 1.0)
     seen = np.all([part.seen for part in parts], axis=0)
@@ -106,6 +106,6 @@ def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> L
     )
 
 
-def _time_s(parts: list[Plate], shares: FloatArray) -> float:
+def _time_s(parts: list[Plate], shares: Doubles) -> float:
     """Return the instant that a light's plate shows: the mean of its flashes', by how much each counts."""
     return float(np.average([plate.time_s for plate in parts], weights=np.abs(shares)))

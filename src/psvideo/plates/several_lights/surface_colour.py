@@ -9,11 +9,8 @@ from functools import reduce
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.coded import Image
-
-Flags = NDArray[np.bool_]
+from psvideo.model.arrays import Flags, Image
 
 CONTRADICTION = 0.05
 """Flashes whose products leave a larger share of themselves unexplained show different surfaces: normals that are some

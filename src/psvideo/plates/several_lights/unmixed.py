@@ -10,10 +10,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Doubles, Flags, Image
 from psvideo.model.irradiance.colours import WHITE, Unmixing
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash
@@ -23,9 +21,6 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.plates.several_lights.surface_colour import colours_of, contradicted
 from psvideo.plates.split import Plate
-
-Flags = NDArray[np.bool_]
-
 
 DOUBT = 0.1
 """What a surface's colour is taken to be off by, where the report says what that costs."""
@@ -104,7 +99,7 @@ def unmixed(one: Round, how: Unmixing) -> Round:
     return flashes.corrected(apart_round, how) if how.alone else apart_round
 
 
-def _unsure_together(unsure: Image, shares: FloatArray) -> Image:
+def _unsure_together(unsure: Image, shares: Doubles) -> Image:
     """Return by how much lamps' plates may be off, (light, row, col), where the flashes may be, (slot, row, col)."""
     weights = np.abs(shares).mean(axis=-1) ** 2  # (light, slot)
     return np.asarray(np.sqrt(np.einsum("ls,srx->lrx", weights, unsure**2)), np.float32)
@@ -134,7 +129,7 @@ class _Flashes:
         away_s = [np.abs(plate.flashed_s - self.one.time_s).min() for plate in self.one.plates]
         return int(np.argmin(away_s))
 
-    def together(self, how: Unmixing, shares: FloatArray) -> Iterator[LightPlate]:
+    def together(self, how: Unmixing, shares: Doubles) -> Iterator[LightPlate]:
         """Yield every lamp's plate out of all flashes."""
         seen = np.logical_and.reduce([plate.pixels_seen for plate in self.one.plates])
         for share, name in zip(shares, how.shown.lights, strict=True):

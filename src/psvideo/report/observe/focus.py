@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
+from psvideo.model.arrays import Floats
 from psvideo.plates.mixing.mixture import Mixture
 
 SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
@@ -31,9 +32,6 @@ STEEP_SQUARE = 0.98
 STEEPEST = 1e-3
 """A slope counts from a quarter of the one that this share of the picture exceeds."""
 KERNEL = np.array([[-0.5, 0, 0.5]], np.float32)
-
-Plane = NDArray[np.float32]
-Squares = NDArray[np.float32]
 
 
 def middle_of(picture: Mixture) -> NDArray[np.float32]:
@@ -62,7 +60,7 @@ def sharpest_blur_px(grey: NDArray[np.float32]) -> float | None:
     return blur_px
 
 
-def _steepest_squares(grey: NDArray[np.float32]) -> Squares:
+def _steepest_squares(grey: NDArray[np.float32]) -> Floats:
     """Return the squares of a picture that have the steepest edges, (square, row, col); a small picture as it is."""
     down, across = (size // SQUARE_PX for size in grey.shape)
     if grey.size <= SQUARES * SQUARE_PX**2 or down * across <= SQUARES:
@@ -75,7 +73,7 @@ def _steepest_squares(grey: NDArray[np.float32]) -> Squares:
     return np.ascontiguousarray(_in_squares(inside, SQUARE_PX)[best])
 
 
-def _in_squares(picture: NDArray[np.float32], side: int) -> Squares:
+def _in_squares(picture: NDArray[np.float32], side: int) -> Floats:
     """Return a picture (row, col) cut into squares, (square, row, col)."""
     rows, cols = picture.shape
     return picture.reshape(rows // side, side, cols // side, side).swapaxes(1, 2).reshape(-1, side, side)
@@ -92,10 +90,10 @@ def _noise(grey: NDArray[np.float32]) -> float:
 class _Slopes:
     """Slopes of squares after a blur, (square, row, col): to the right, down, their size; each blur is made once."""
 
-    squares: Squares
-    _made: dict[float, tuple[Squares, Squares, Squares]] = field(default_factory=dict)
+    squares: Floats
+    _made: dict[float, tuple[Floats, Floats, Floats]] = field(default_factory=dict)
 
-    def after(self, sigma_px: float) -> tuple[Squares, Squares, Squares]:
+    def after(self, sigma_px: float) -> tuple[Floats, Floats, Floats]:
         """Return the slopes after a blur."""
         if sigma_px not in self._made:
             pairs = [_slopes(_blurred(one, sigma_px)) for one in self.squares]
@@ -130,7 +128,7 @@ def _blur_between(slopes: _Slopes, first_px: float, again_px: float, *, noise: f
     return quantile(blur_px, SHARPEST)
 
 
-def _each(function: Callable[[NDArray[np.float32]], NDArray[np.float32]], squares: Squares) -> Squares:
+def _each(function: Callable[[NDArray[np.float32]], NDArray[np.float32]], squares: Floats) -> Floats:
     return np.stack([function(one) for one in squares])
 
 
@@ -138,11 +136,11 @@ def _summed(square: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(cv2.boxFilter(square, -1, TILE, normalize=False), np.float32)
 
 
-def _blurred(square: Plane, sigma_px: float) -> Plane:
+def _blurred(square: Floats, sigma_px: float) -> Floats:
     return np.asarray(cv2.GaussianBlur(square, (0, 0), sigma_px), np.float32) if sigma_px else square
 
 
-def _ridge(right: Plane, down: Plane, steep: Plane) -> NDArray[np.bool_]:
+def _ridge(right: Floats, down: Floats, steep: Floats) -> NDArray[np.bool_]:
     """Return where the slope is greatest across its edge."""
     across = np.abs(right) > np.abs(down)
     row = steep >= cv2.dilate(steep, np.ones((1, 3), np.uint8))
@@ -155,11 +153,11 @@ def _slope(grey: NDArray[np.float32]) -> NDArray[np.float32]:
     return _size(*_slopes(grey))
 
 
-def _slopes(grey: Plane) -> tuple[Plane, Plane]:
+def _slopes(grey: Floats) -> tuple[Floats, Floats]:
     """Return central differences to the right and down."""
     right, down = (cv2.filter2D(grey, cv2.CV_32F, kernel) for kernel in (KERNEL, KERNEL.T))
     return np.asarray(right, np.float32), np.asarray(down, np.float32)
 
 
-def _size(right: Plane, down: Plane) -> Plane:
+def _size(right: Floats, down: Floats) -> Floats:
     return np.asarray(cv2.magnitude(right, down), np.float32)

@@ -7,6 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Integers
+
 STOPS = 14
 PER_STOP = 8
 BINS = STOPS * PER_STOP
@@ -18,10 +20,8 @@ HEADROOM = 0.9
 """The share of saturation below which TARGET_QUANTILE of the subject should be."""
 LEAST_POWER = 0.1
 
-Counts = NDArray[np.int64]
 
-
-def count_levels(light: NDArray[np.float32], saturation: float) -> Counts:
+def count_levels(light: NDArray[np.float32], saturation: float) -> Integers:
     """Return how many samples lie in every bin, shape (BINS + 2,): first those below 14 stops under saturation, last
     those that are clipped. Bins are read off the numbers' own bits: 8 of equal width per doubling."""
     relative = np.ascontiguousarray(light, np.float32).ravel() / np.float32(saturation)
@@ -33,7 +33,7 @@ def count_levels(light: NDArray[np.float32], saturation: float) -> Counts:
 class Levels:
     """The light of one lamp on the subject over a take, as ``counts`` of ``count_levels``."""
 
-    counts: Counts
+    counts: Integers
 
     @cached_property
     def total(self) -> int:

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
+from psvideo.model.arrays import Bytes
 from psvideo.plates.align.velocity.flow import TOE, pixel_places
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.several_lights.clipped_flashes import Filled, coarser, filled_of, vague_between
+from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
 
 WIDTH_PX = 480
 LEAST_CHANGE, NOISE_FACTOR = 1.5, 5.0
@@ -41,7 +42,7 @@ class Glimpse:
     time_s: float
     white: float
     seen: bool
-    filled: Filled | None = None
+    filled: Bytes | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

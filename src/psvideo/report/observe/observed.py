@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Masks
 from psvideo.compute.ranks import quantile
+from psvideo.model.arrays import Integers
 from psvideo.model.channels import brightest_channel
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Surface
@@ -24,7 +25,7 @@ from psvideo.report.observe.alignment.astray import Astray, astray
 from psvideo.report.observe.facts import FAINT, Dark, Seen, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.kept_facts import KeptFacts
-from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
+from psvideo.report.observe.levels import BINS, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
@@ -80,7 +81,7 @@ class Observed:
     white: float | None = None
     stills: bool = False
     facts: KeptFacts = field(default_factory=KeptFacts)
-    counts: dict[str, Counts] = field(default_factory=dict)
+    counts: dict[str, Integers] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     away: list[float] = field(default_factory=list)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
 from psvideo.compute.spilled import thin
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.surface import Surface
 
 FACING_AWAY = -0.15
@@ -21,7 +21,7 @@ LOW = 0.25
 
 
 def shadow_light(
-    bright: NDArray[np.float32], shown: NDArray[np.bool_], surface: Surface, ways: FloatArray, *, step: int
+    bright: NDArray[np.float32], shown: NDArray[np.bool_], surface: Surface, ways: Doubles, *, step: int
 ) -> float | None:
     """Return the light in attached shadow, as a share of what the same surface gives when it faces the lamp; None where
     too little of the subject lies in such shadow.

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
+from psvideo.model.arrays import Floats
 from psvideo.model.surface import Surface
 from psvideo.report.observe.thinned import thin_surface
 
@@ -16,8 +17,6 @@ MOST_TURNED_DEG = 5.0
 WINDOW = 5
 ENOUGH = 8192
 """Medians are taken over this many pixels, spread evenly: more would not change them."""
-
-Values = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -34,8 +33,8 @@ class Change:
 class Sample:
     """A surface, thinned."""
 
-    normals: Values
-    albedo: Values
+    normals: Floats
+    albedo: Floats
     valid: NDArray[np.bool_]
 
 
@@ -69,7 +68,7 @@ def change(before: Sample, after: Sample) -> Change | None:
     )
 
 
-def _points_alike(one: Values, other: Values) -> NDArray[np.bool_]:
+def _points_alike(one: Floats, other: Floats) -> NDArray[np.bool_]:
     """Return where vectors of any length (row, col, 3) are turned by no more than MOST_TURNED_DEG."""
     cosine, lengths = np.einsum("...i,...i", one, other), np.zeros(one.shape[:2], np.float32)
     np.multiply(np.einsum("...i,...i", one, one), np.einsum("...i,...i", other, other), out=lengths)
@@ -77,7 +76,7 @@ def _points_alike(one: Values, other: Values) -> NDArray[np.bool_]:
     return np.asarray(cosine >= least * np.sqrt(lengths))
 
 
-def _angle_deg(one: Values, other: Values) -> NDArray[np.float64]:
+def _angle_deg(one: Floats, other: Floats) -> NDArray[np.float64]:
     """Return the angles between vectors of any length; exact for small ones."""
     across = np.linalg.norm(np.cross(one, other), axis=-1)
     return np.asarray(np.rad2deg(np.arctan2(across, np.einsum("...i,...i", one, other))), np.float64)

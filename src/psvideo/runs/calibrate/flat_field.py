@@ -13,7 +13,7 @@ from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
 from psvideo.formats.flat_toml import format_falloff
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import refuse_existing, write_text
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import Ground, ground_of
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
@@ -103,7 +103,7 @@ def white_target(
     return Target(albedo=albedo, normal=normal, rows=rows, cols=cols), ground
 
 
-def _towards_camera(plane: tuple[float, float, float, float]) -> FloatArray:
+def _towards_camera(plane: tuple[float, float, float, float]) -> Doubles:
     """Return a plane's unit normal on the camera's side; (a, b, c, d) may have either sign."""
     normal = np.array(plane[:3]) * (-1.0 if plane[3] < 0 else 1.0)
     return np.asarray(normal / np.linalg.norm(normal))

@@ -1,15 +1,12 @@
 """A picture of one instant for eyes."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from psvideo.model.arrays import Pixels
 from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.on_screen import exposure_for, smaller, smaller_by_rows, srgb
 from psvideo.pictures.quantity import picture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import Instant
 
-Pixels = NDArray[np.uint8]
 SHOWN_WIDTH_PX, WIDE_PX = 600, 1200
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where it is not there."""

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.clip.decode import exr
 from psvideo.compute.memory import HALF_MAX
 from psvideo.compute.progress import Watch
+from psvideo.model.arrays import Image, Pixels
 from psvideo.model.choices import Codec, Preview
 from psvideo.model.quantities import QUANTITIES
 from psvideo.pictures.on_screen import exposure_for, smaller, srgb
@@ -25,8 +25,6 @@ from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relit_kernel import shown_by
 from psvideo.runs.delivery.relit import TURN_S, WIDTH_PX, read_relit
 
-Pixels = NDArray[np.uint8]
-Image = NDArray[np.float32]
 INK = (226, 226, 226)
 
 

@@ -18,12 +18,12 @@ from psvideo.clip.decode import exr
 from psvideo.compute.halves import halves_of
 from psvideo.export.space import Space, placed
 from psvideo.formats.whole_files import whole_file
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Halves
 from psvideo.model.irradiance.light_field import Points, light_vectors
 from psvideo.model.plan import Plan, PlannedFlash, reference_duration_s
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
-from psvideo.pictures.relit_kernel import Halves, relit
+from psvideo.pictures.relit_kernel import relit
 from psvideo.plates.sequence import Round
 
 TURN_S = 4.0
@@ -76,7 +76,7 @@ def blur_of(one: Round, plan: Plan, rig: Rig, fps: Fraction) -> NDArray[np.float
     return added
 
 
-def _weights(one: Round, plan: Plan, rig: Rig, light: FloatArray) -> NDArray[np.float32]:
+def _weights(one: Round, plan: Plan, rig: Rig, light: Doubles) -> NDArray[np.float32]:
     """Return by which weights a round's lights add up to another, in the middle of the picture, (light, channel)."""
     alone = tuple(
         PlannedFlash(lights={plate.light: 1.0}, duration_s=reference_duration_s(plan, plate.light))
@@ -109,7 +109,7 @@ def _half(plane: NDArray[np.floating]) -> Halves:
     return plane if plane.dtype == np.float16 else halves_of(plane.astype(np.float32))[0]
 
 
-def _from(number: int, fps: Fraction) -> FloatArray:
+def _from(number: int, fps: Fraction) -> Doubles:
     """Return the light's direction at an instant, in the camera's frame."""
     angle = 2 * math.pi * number / float(fps) / TURN_S
     return np.array([TILT * math.cos(angle), TILT * math.sin(angle), math.sqrt(1 - TILT**2)])

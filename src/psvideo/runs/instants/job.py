@@ -4,13 +4,11 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from psvideo.clip import Take
 from psvideo.errors import UsageError
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.sequences.tags import Tags
+from psvideo.model.arrays import Pixels
 from psvideo.model.choices import Solver
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.plan import Plan
@@ -27,8 +25,6 @@ from psvideo.runs.steps.output import tags_of
 from psvideo.solve.depth import Shaping
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.passes.asked_passes import AskedPasses
-
-Pixels = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from psvideo import __version__
 from psvideo.clip import Clip, Masks, Take
 from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.whole_files import write_text
+from psvideo.model.arrays import Pixels
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.several_lights.unmixed import slot_names
@@ -27,7 +25,6 @@ from psvideo.runs.steps.lighting import Lighting
 from psvideo.runs.steps.output import Output
 from psvideo.runs.steps.saturation import saturation_of
 
-Pixels = NDArray[np.uint8]
 LIBRARIES = ("numpy", "opencv-contrib-python-headless", "numba", "OpenEXR")
 
 

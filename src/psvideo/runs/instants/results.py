@@ -4,9 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from psvideo.compute.heap import give_back
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
@@ -15,6 +12,7 @@ from psvideo.export.sequences.result_files import mesh_file
 from psvideo.export.usd.usd_animation import write_animation
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
+from psvideo.model.arrays import Pixels
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.sequence import coming
 from psvideo.plates.several_lights.unmixed import unmixing_note
@@ -32,8 +30,6 @@ from psvideo.runs.steps.output import Output, begun_by, folder_of
 from psvideo.solve.depth import scale_note
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import trust_note
-
-Pixels = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, kw_only=True)

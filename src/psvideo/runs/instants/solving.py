@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import MOST_WAITING, writing
 from psvideo.export.sequences.result_files import is_written
+from psvideo.model.arrays import Pixels
 from psvideo.plates.ambient.ambient_shown import has_one_dark_slot
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
@@ -19,7 +20,7 @@ from psvideo.runs.delivery.delivering import surface_job, write_plates, write_sp
 from psvideo.runs.delivery.look import SAMPLE_ROUND, instant_sheet
 from psvideo.runs.delivery.relit import blur_of
 from psvideo.runs.instants.depths import shape_of
-from psvideo.runs.instants.job import Beginning, Found, Job, Piece, Pixels
+from psvideo.runs.instants.job import Beginning, Found, Job, Piece
 from psvideo.runs.instants.reporting import observing
 from psvideo.solve.depth import kept_beside, reservations
 from psvideo.solve.instants import Instant, denoised, subject_of, surfaces

@@ -17,15 +17,13 @@ from psvideo.compute.threads import over_ranges
 from psvideo.export.ptm_file import write_ptm
 from psvideo.formats.screen_pictures import write_jpeg
 from psvideo.formats.whole_files import write_text
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats, Pixels
 from psvideo.model.rig import Rig, directions, intensities
 from psvideo.model.srgb import srgb_share
 from psvideo.pictures.on_screen import exposure_for
 from psvideo.plates.sequence import Round
 from psvideo.solve.passes.plate_rows import BAND_PIXELS, PlateRows
 
-Floats = NDArray[np.float32]
-Pixels = NDArray[np.uint8]
 FOLDER = "rti"
 PTM = "relight.ptm"
 LARGEST_PX = 4096
@@ -56,7 +54,7 @@ def write_rti(folder: Path, one: Round, rig: Rig) -> None:
     _write_map(folder / FOLDER, base, terms, lamps)
 
 
-def _write_map(target: Path, base: Pixels, terms: NDArray[np.float16], lamps: FloatArray) -> None:
+def _write_map(target: Path, base: Pixels, terms: NDArray[np.float16], lamps: Doubles) -> None:
     """Write planes, info.json and the .ptm of a colour (row, col, 3) and polynomials (row, col, 6)."""
     target.mkdir(parents=True, exist_ok=True)
     scale, bias = [1.0] * RED_GREEN_BLUE, [0.0] * RED_GREEN_BLUE
@@ -84,13 +82,13 @@ def _write_map(target: Path, base: Pixels, terms: NDArray[np.float16], lamps: Fl
     write_text(target / "info.json", json.dumps(info, indent=1) + "\n")
 
 
-def terms_of(lights: FloatArray) -> FloatArray:
+def terms_of(lights: Doubles) -> Doubles:
     """Return the polynomial's terms for directions (light, 3): 1, x, y, x squared, x times y, y squared."""
     x, y = lights[:, 0], lights[:, 1]
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 
-def _fitted(rows: PlateRows, lamps: FloatArray, strengths: FloatArray, step: int) -> tuple[Pixels, NDArray[np.float16]]:
+def _fitted(rows: PlateRows, lamps: Doubles, strengths: Doubles, step: int) -> tuple[Pixels, NDArray[np.float16]]:
     """Return the colour of every pixel in codes (row, col, 3), its largest channel 255, and the polynomials
     (row, col, 6)."""
     high, wide = rows.shape[0] // step, rows.shape[1] // step
@@ -113,7 +111,7 @@ def _fitted(rows: PlateRows, lamps: FloatArray, strengths: FloatArray, step: int
     return base, terms
 
 
-def _shown(light: Floats, step: int, strength: Sequence[float] | FloatArray) -> Floats:
+def _shown(light: Floats, step: int, strength: Sequence[float] | Doubles) -> Floats:
     """Return a plate's rows as a screen shows them, (row, col, 3), each pixel the mean of ``step`` by ``step``."""
     high, wide = light.shape[0] // step, light.shape[1] // step
     blocks = light[:, : wide * step].reshape(high, step, wide, step, -1)
@@ -121,7 +119,7 @@ def _shown(light: Floats, step: int, strength: Sequence[float] | FloatArray) -> 
     return np.broadcast_to(srgb_share(even), (high, wide, 3))
 
 
-def _codes(plane: NDArray[np.floating], low: FloatArray, span: FloatArray) -> Pixels:
+def _codes(plane: NDArray[np.floating], low: Doubles, span: Doubles) -> Pixels:
     """Return 8-bit codes that go from ``low`` to so much more, (row, col, 3)."""
     codes = np.empty(plane.shape, np.uint8)
     for row, shown in zip(plane, codes, strict=True):

@@ -16,7 +16,7 @@ from psvideo.clip.in_file import RowsInFile
 from psvideo.clip.reading import looks
 from psvideo.clip.stills import Photographs
 from psvideo.clip.transfer import find_curve, to_light
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Light
 
 POINTS = 6000
@@ -54,13 +54,13 @@ class Glance:
     """Signals of a few pixels, (light, pixel), 0 to 1 as the files code them, and the distant lights' vectors; ``dark``
     (pixel,) are those of the ambient light alone, of which each picture holds ``dark_times`` as much, (light,)."""
 
-    signals: FloatArray
-    directions: FloatArray
-    strengths: FloatArray
-    dark: FloatArray | None = None
-    dark_times: FloatArray | None = None
+    signals: Doubles
+    directions: Doubles
+    strengths: Doubles
+    dark: Doubles | None = None
+    dark_times: Doubles | None = None
 
-    def exposed(self, relative: FloatArray) -> "Glance":
+    def exposed(self, relative: Doubles) -> "Glance":
         """Return the same, taken to be exposed so: (picture,), the dark one last."""
         count = len(self.strengths)
         times = None if self.dark is None else relative[:count] / relative[count]
@@ -94,7 +94,7 @@ class Glance:
             shares.append(float(np.median(np.linalg.norm(residual, axis=0) / np.maximum(sizes, 1e-12))))
         return shares[0], shares[1]
 
-    def _lit(self, transfer: str) -> FloatArray:
+    def _lit(self, transfer: str) -> Doubles:
         """Return what the lights gave, (light, pixel), each as if it were of strength 1."""
         curve = find_curve(transfer)
         light = to_light(curve, self.signals)
@@ -103,15 +103,15 @@ class Glance:
             light = np.maximum(light - times[:, None] * to_light(curve, self.dark), 0)
         return np.asarray(light / self.strengths[:, None], np.float64)
 
-    def _used(self, lit: FloatArray) -> NDArray[np.bool_]:
+    def _used(self, lit: Doubles) -> NDArray[np.bool_]:
         return np.asarray((lit > LEAST * lit.max(axis=0)) & (self.signals < MOST))
 
 
-def _enough(used: NDArray[np.bool_], brightest: FloatArray) -> NDArray[np.bool_]:
+def _enough(used: NDArray[np.bool_], brightest: Doubles) -> NDArray[np.bool_]:
     return np.asarray((used.sum(axis=0) >= LIGHTS_FOR_CURVE) & (brightest > SUBJECT * np.percentile(brightest, 99)))
 
 
-def _residual(lit: FloatArray, directions: FloatArray, weights: FloatArray) -> FloatArray:
+def _residual(lit: Doubles, directions: Doubles, weights: Doubles) -> Doubles:
     """Return what of (light, pixel) no matte surface explains, in least squares with these weights, and times them."""
     normal = np.einsum("lp,li,lj->pij", weights**2, directions, directions) + 1e-6 * np.eye(3)
     right = np.einsum("lp,li->pi", lit * weights**2, directions)
@@ -130,7 +130,7 @@ def glance_at(pictures: Photographs, lights: Sequence[Light]) -> Glance | None:
     return Glance(signals=np.array(signals), dark=dark, directions=np.array(directions), strengths=np.array(green))
 
 
-def _thin(pictures: Photographs, file: Path) -> FloatArray:
+def _thin(pictures: Photographs, file: Path) -> Doubles:
     """Return the signals of a few pixels of a picture of such a kind, in its second channel, shape (pixel,)."""
     codes = opened(pictures.kind, file).codes
     step = max(int(np.sqrt(codes.shape[0] * codes.shape[1] / POINTS)), 1)
@@ -181,7 +181,7 @@ def curve_doubt(glance: Glance | None, pictures: Photographs) -> str | None:
 
 def exposures_of(
     glance: Glance | None, pictures: Photographs, count: int
-) -> tuple[FloatArray | None, str | None, str | None]:
+) -> tuple[Doubles | None, str | None, str | None]:
     """Return by how much more each picture, the dark one last, was exposed than the usual one of ``count`` lights; None
     where all are alike or their files cannot be believed. With what to note, and what to warn of."""
     named = [one.exposure for one in pictures.stated]
@@ -217,5 +217,5 @@ def exposures_of(
     )
 
 
-def _differ(exposures: FloatArray) -> bool:
+def _differ(exposures: Doubles) -> bool:
     return bool(exposures.max() >= OTHER_EXPOSURE * exposures.min())

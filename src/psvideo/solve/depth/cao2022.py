@@ -19,12 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import bands, kept_in, let_go, lie_in_files, room_for
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
 from psvideo.solve.depth.view import Box, Slopes, View, slopes_of
-
-Mask = NDArray[np.bool_]
-Floats = NDArray[np.float32]
 
 __all__ = ["BILATERAL", "SMOOTH", "Before", "Height", "Integration", "integrate"]
 
@@ -50,7 +47,7 @@ class Height:
     rightward, downward: (row, col), how much a pixel's step to the right and down counts against the opposite one.
     """
 
-    height: FloatArray
+    height: Doubles
     valid: Mask
     cut_east: Mask
     cut_south: Mask

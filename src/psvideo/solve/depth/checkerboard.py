@@ -11,18 +11,15 @@ so that a grid larger than the cache is read once for all of them.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import REORDERED
 from psvideo.compute.spilled import room_apart
-
-Board = NDArray[np.float32]
-"""Of shape (2, row + 2, half a row + 2)."""
+from psvideo.model.arrays import Floats
 
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 
 
-def empty_board(rows: int, cols: int) -> Board:
+def empty_board(rows: int, cols: int) -> Floats:
     """Return a board of zeros for a grid of that size."""
     return room_apart((2, rows + 2, (cols + 1) // 2 + 2), np.float32)
 

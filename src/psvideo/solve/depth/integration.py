@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from psvideo.compute.heap import give_back
 from psvideo.compute.spilled import bands, kept_in, let_go, lie_in_files, room_for
-from psvideo.model.camera import FloatArray
-from psvideo.solve.depth.checkerboard import Board, empty_board
+from psvideo.model.arrays import Doubles, Floats
+from psvideo.solve.depth.checkerboard import empty_board
 from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, set_up_levels, solve, weighed
 from psvideo.solve.depth.reweighting import add_board, fill_equations, pull_to_pins, weigh_sides, write_board
 from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import Slopes
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +55,7 @@ class TakenOver:
     same: NDArray[np.bool_]
     rightward: Floats
     downward: Floats
-    height: FloatArray
+    height: Doubles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +63,7 @@ class _Work:
     """One integration: what is given of the surface, the height so far and the shares, changed in place, and memory."""
 
     given: tuple[Floats, Floats, Floats, np.float32]
-    height: FloatArray
+    height: Doubles
     rightward: Floats
     downward: Floats
     lines: Floats
@@ -83,7 +81,7 @@ class _Work:
 
 def find_height(
     slopes: Slopes, how: Integration, *, held: TakenOver | None = None, spare: Path | None = None
-) -> tuple[FloatArray, Floats, Floats]:
+) -> tuple[Doubles, Floats, Floats]:
     """Return the height, and the shares of the steps to the right and down, all (row, col).
 
     spare: a folder in whose files these and the ``slopes`` may lie, where they are large."""
@@ -133,7 +131,7 @@ def _take_over(work: _Work, held: TakenOver) -> None:
     work.in_bands(take, held.rightward, held.downward)
 
 
-def _room_at_first(slopes: Slopes, height: FloatArray | None, spare: Path | None) -> tuple[FloatArray, Floats, Floats]:
+def _room_at_first(slopes: Slopes, height: Doubles | None, spare: Path | None) -> tuple[Doubles, Floats, Floats]:
     """Return the height to begin with, else 0, and equal shares."""
     shape = slopes.facing.shape
     rightward, downward = (room_for(shape, np.float32, spare) for _ in range(2))
@@ -144,7 +142,7 @@ def _room_at_first(slopes: Slopes, height: FloatArray | None, spare: Path | None
     return room_for(shape, np.float64, spare) if height is None else kept_in(height, spare), rightward, downward
 
 
-def _begun(slopes: Slopes, height: FloatArray, rightward: Floats, downward: Floats) -> _Work:
+def _begun(slopes: Slopes, height: Doubles, rightward: Floats, downward: Floats) -> _Work:
     rows, cols = slopes.facing.shape
     facing, across, down = (
         plane.astype(np.float32, copy=False) for plane in (slopes.facing, slopes.across, slopes.down)
@@ -211,12 +209,12 @@ def _settle(work: _Work, stop: float, *, most: int, held: TakenOver | None = Non
         lacked = first
 
 
-def _pull(work: _Work, pins: Board, wanted: FloatArray) -> None:
+def _pull(work: _Work, pins: Floats, wanted: Doubles) -> None:
     lacking = work.grids.levels[0].right
     work.in_bands(partial(pull_to_pins, pins, work.height, wanted, lacking), wanted)
 
 
-def _pins(held: TakenOver, work: _Work) -> Board:
+def _pins(held: TakenOver, work: _Work) -> Floats:
     pins = empty_board(*work.height.shape)
     for first, last in bands(len(held.same)):
         write_board(np.where(held.same[first:last], np.float32(HOLD), np.float32(0)), pins, first)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import REORDERED
 from psvideo.compute.spilled import room_apart
-from psvideo.solve.depth.checkerboard import Board, ascend, descend, empty_board, invert, pull, settle
+from psvideo.model.arrays import Floats
+from psvideo.solve.depth.checkerboard import ascend, descend, empty_board, invert, pull, settle
 from psvideo.solve.depth.torn_blocks import OWN, coarsen, coarsen_pins, mend, part, prolong_moved, restrict_moved
 
 COARSEST_PIXELS = 64
@@ -32,12 +33,12 @@ class Level:
     """One grid: its ties, what is wanted of it, and the memory for its part of a cycle; see ``checkerboard.py``."""
 
     ties: NDArray[np.float32]
-    inverse: Board
-    right: Board
-    height: Board
+    inverse: Floats
+    right: Floats
+    height: Floats
     belongs: NDArray[np.int8]
     room: NDArray[np.int32]
-    pins: Board
+    pins: Floats
     moved: NDArray[np.int32]
 
 
@@ -49,9 +50,9 @@ class Grids:
     """
 
     levels: list[Level]
-    step: Board
-    spread: Board
-    sum: Board
+    step: Floats
+    spread: Floats
+    sum: Floats
     line: NDArray[np.float32]
     sums: NDArray[np.float32]
 
@@ -82,7 +83,7 @@ def empty_grids(shape: tuple[int, int]) -> Grids:
     return Grids(levels=levels, step=step, spread=levels[0].height, sum=total, line=line, sums=sums)
 
 
-def set_up_levels(grids: Grids, pins: Board | None = None) -> bool:
+def set_up_levels(grids: Grids, pins: Floats | None = None) -> bool:
     """Give the hierarchy the ties of its finest grid, and pins if there are any; return whether there are."""
     pinned = pins is not None
     grids.levels[0].pins = grids.levels[0].pins if pins is None else pins

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import bands, kept_in, let_go
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.irradiance.ground import FARTHEST_SHARE
-from psvideo.solve.depth.cao2022 import Height, Mask
+from psvideo.solve.depth.cao2022 import Height
 from psvideo.solve.depth.view import Box, View
 
 LEAST_PART_PX = 64
@@ -129,7 +129,7 @@ class _Anchor:
     everywhere); the ``plane`` that they are read from, if any. Whole planes of heights, in 64 bits, would be as large
     as all that integrating takes."""
 
-    heights: Callable[[Box], FloatArray]
+    heights: Callable[[Box], Doubles]
     seen: Callable[[Box], Mask] | None = None
     plane: NDArray[np.float32] | None = None
 
@@ -160,7 +160,7 @@ def _anchors(
     return anchors
 
 
-def _shift(height: FloatArray, part: _Part, anchors: list[_Anchor]) -> float:
+def _shift(height: Doubles, part: _Part, anchors: list[_Anchor]) -> float:
     """By how much a part's height is to be raised."""
     size = sum(int(np.count_nonzero(mine)) for _, mine in part.bands())
     for anchor in anchors:
@@ -170,7 +170,7 @@ def _shift(height: FloatArray, part: _Part, anchors: list[_Anchor]) -> float:
     return -_median(height, part, size, None)
 
 
-def _median(height: FloatArray, part: _Part, count: int, anchor: _Anchor | None) -> float:
+def _median(height: Doubles, part: _Part, count: int, anchor: _Anchor | None) -> float:
     """Return the median, over the ``count`` pixels of a part that an anchor knows, of what it lies above the height;
     without an anchor, of the part's height."""
     values = np.empty(count)
@@ -190,16 +190,16 @@ def _median(height: FloatArray, part: _Part, count: int, anchor: _Anchor | None)
     return float(np.median(values, overwrite_input=True))
 
 
-def _put(depth: NDArray[np.float32], height: FloatArray, part: _Part, shift: float, view: View) -> None:
+def _put(depth: NDArray[np.float32], height: Doubles, part: _Part, shift: float, view: View) -> None:
     """Put a part's depth into its place."""
     for box, mine in part.bands():
         depth[box][mine] = _depth_of(height[box][mine] + shift, view, depth.shape[1])
         let_go(height[box[0]])
 
 
-def _depth_of(height: FloatArray, view: View, width_px: int) -> FloatArray:
+def _depth_of(height: Doubles, view: View, width_px: int) -> Doubles:
     """Depth from height: metres or relative, or orthographic in widths of the picture about a median of 1."""
-    depth: FloatArray = 1.0 + height / width_px if view.focal_px is None else np.exp(height / view.focal_px[0])
+    depth: Doubles = 1.0 + height / width_px if view.focal_px is None else np.exp(height / view.focal_px[0])
     return depth
 
 
@@ -211,12 +211,12 @@ def _known(depth: NDArray[np.float32], view: View) -> _Anchor:
     )
 
 
-def _height_of(depth: NDArray[np.float32], view: View, width_px: int) -> FloatArray:
+def _height_of(depth: NDArray[np.float32], view: View, width_px: int) -> Doubles:
     """The inverse of ``_depth_of``; anything where the depth is not above 0."""
     there = np.where(depth > 0, depth, 1).astype(np.float64)
     if view.focal_px is None:
         return (there - 1.0) * width_px
-    height: FloatArray = np.log(there) * view.focal_px[0]
+    height: Doubles = np.log(there) * view.focal_px[0]
     return height
 
 
@@ -224,7 +224,7 @@ def _plane(plane: Plane, view: View, shape: tuple[int, ...]) -> _Anchor:
     """Return the heights of a plane in every pixel; beyond its horizon that of the farthest."""
     x, y = view.rays(shape[0], shape[1])
 
-    def inverse(x: FloatArray, y: FloatArray) -> FloatArray:
+    def inverse(x: Doubles, y: Doubles) -> Doubles:
         toward = plane[2] - plane[0] * x - plane[1] * y
         return toward / plane[3] if plane[3] else np.zeros_like(toward)  # 1 / depth along the ray (x, y, -1)
 

@@ -7,11 +7,11 @@ for periodic; the cosine transform (T. Simchony et al. 1990) leaves its border f
 import numpy as np
 
 from psvideo.compute.spilled import BAND_ROWS, let_go
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.solve.depth.view import Slopes
 
 
-def poisson_height(slopes: Slopes) -> FloatArray:
+def poisson_height(slopes: Slopes) -> Doubles:
     """Return the height (row, col), of mean 0, whose steps fit the slopes' best in the sense of least squares.
 
     A step between two pixels is to be the mean of their slopes, all steps count alike. Every pixel must be valid: a
@@ -27,11 +27,11 @@ def poisson_height(slopes: Slopes) -> FloatArray:
     for row in range(1, rows):
         spectrum[row] /= down[row] + across
     spectrum[0, 0] = 0.0
-    height: FloatArray = idctn(spectrum, type=2, norm="ortho", overwrite_x=True)
+    height: Doubles = idctn(spectrum, type=2, norm="ortho", overwrite_x=True)
     return height
 
 
-def _divergence(slopes: Slopes) -> FloatArray:
+def _divergence(slopes: Slopes) -> Doubles:
     """Return how much more goes out of every pixel than comes in, (row, col), one row after the other."""
     rows, cols = slopes.facing.shape
     divergence, above = np.zeros((rows, cols)), np.zeros(cols)
@@ -53,7 +53,7 @@ def _divergence(slopes: Slopes) -> FloatArray:
     return divergence
 
 
-def _eigenvalues(count: int) -> FloatArray:
+def _eigenvalues(count: int) -> Doubles:
     """The second difference's eigenvalues with free ends, for a row of this many pixels."""
-    values: FloatArray = 2.0 * np.cos(np.pi * np.arange(count) / count) - 2.0
+    values: Doubles = 2.0 * np.cos(np.pi * np.arange(count) / count) - 2.0
     return values

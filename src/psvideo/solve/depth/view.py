@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Rig
 
 Box = tuple[slice, slice]
@@ -32,7 +32,7 @@ class View:
         """Whether the view is a pinhole's."""
         return self.focal_px is not None
 
-    def rays(self, rows: int, cols: int) -> tuple[FloatArray, FloatArray]:
+    def rays(self, rows: int, cols: int) -> tuple[Doubles, Doubles]:
         """Return x, shape (col,), and y, shape (row, 1), of the ray (x, y, -1) through every pixel's centre.
 
         Orthographic: all rays are parallel to the axis, and both are 0.
@@ -40,11 +40,11 @@ class View:
         if self.focal_px is None:
             return np.zeros(cols), np.zeros((rows, 1))
         centre = self.principal_px or ((cols - 1) / 2, (rows - 1) / 2)
-        x: FloatArray = (np.arange(cols, dtype=np.float64) - centre[0]) / self.focal_px[0]
-        y: FloatArray = -(np.arange(rows, dtype=np.float64) - centre[1])[:, None] / self.focal_px[1]
+        x: Doubles = (np.arange(cols, dtype=np.float64) - centre[0]) / self.focal_px[0]
+        y: Doubles = -(np.arange(rows, dtype=np.float64) - centre[1])[:, None] / self.focal_px[1]
         return x, y
 
-    def points(self, depth: NDArray[np.floating]) -> FloatArray:
+    def points(self, depth: NDArray[np.floating]) -> Doubles:
         """Return the points (row, col, 3) in the camera frame for depths along the axis; (0, 0, 0) where depth is 0.
 
         Orthographic: x and y are in the unit of the depth, of which the picture is one wide, from its middle.

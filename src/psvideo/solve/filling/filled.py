@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go
+from psvideo.model.arrays import Bytes, Floats, Mask
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.bucket_queue import queue_for
 from psvideo.solve.filling.growing import grow
@@ -15,7 +16,7 @@ from psvideo.solve.filling.looking import Said, look_rows, mark_lit_rows, said_f
 from psvideo.solve.filling.neighbours import REACH_PX
 from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Work
+from psvideo.solve.normals.task import Samples, Task, Work
 
 MOST_LIGHTS_AROUND = 5
 """A lit pixel belongs to the subject where this many of the nine around it are lit or solved; noise does not."""

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, lent
+from psvideo.model.arrays import Floats
 from psvideo.solve.filling.bucket_queue import BUCKETS, FOREVER, NONE, Queue, push, take_out
 from psvideo.solve.filling.hernandez2011 import from_one, from_two
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours
 from psvideo.solve.filling.tiles import THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
-from psvideo.solve.normals.task import Floats
 
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
 MOST_STEPS = np.float32(50)

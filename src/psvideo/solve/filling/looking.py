@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
+from psvideo.model.arrays import Bytes, Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, ZERO
 from psvideo.solve.normals.loops.measuring import any_asked, is_clipped, is_seen, read_block, samples_of
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
-from psvideo.solve.normals.task import Bytes, Floats, Task, Work
+from psvideo.solve.normals.task import Task, Work
 
 MOST_COUNTED = 2
 """Lights that a filled normal is made from."""

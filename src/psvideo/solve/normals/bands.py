@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Image, Mask
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.mixing.several_pictures import rows_maker
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Mask, Result, Samples, Task
+from psvideo.solve.normals.task import Result, Samples, Task
 
 Memory = TypeVar("Memory")
 

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from psvideo.model.arrays import Floats, Mask
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.loops.blocks import working_memory
-from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, Work, task
+from psvideo.solve.normals.task import Samples, Task, Usable, Work, task
 
 GRID_PX = 480
 """The points at which surfaces are judged are at most this many along the longer side."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.near_light import NearField, is_near, middle_directions, near_field
 from psvideo.model.rig import LEAST_LIGHTS, Light, directions, intensities
@@ -21,15 +21,15 @@ class Illumination:
     (light, channel): a plate is albedo * intensity * max(0, n . direction). With near lights both hold in the middle of
     the surface, and ``near`` says what they are in every pixel."""
 
-    directions: FloatArray
-    intensities: FloatArray
+    directions: Doubles
+    intensities: Doubles
     names: tuple[str, ...] = ()
     near: NearField | None = None
 
     @property
-    def singular_values(self) -> FloatArray:
+    def singular_values(self) -> Doubles:
         """The three singular values of the directions, largest first; the last is 0 where all lie in one plane."""
-        values: FloatArray = np.linalg.svd(self.directions, compute_uv=False).astype(np.float64)
+        values: Doubles = np.linalg.svd(self.directions, compute_uv=False).astype(np.float64)
         return values
 
     @property

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile, rising_parts
+from psvideo.model.arrays import Doubles
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Samples
-
-Values = NDArray[np.float64]
 
 LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""
@@ -91,13 +90,13 @@ def noise_of(
     return _lesser(alone, *_by_level(*sums), dark_share=dark_share)
 
 
-def _left_over(matrix: Values) -> Values:
+def _left_over(matrix: Doubles) -> Doubles:
     """Return the sums of the lights' measurements, (sum, light), to which a normal and an albedo add nothing: unit
     vectors at right angles, so that each holds the noise of one measurement, at the mean level by its squares."""
     return np.asarray(np.linalg.qr(matrix, mode="complete")[0][:, 3:].T)
 
 
-def _by_level(detail: Values, level: Values, rounding: Values) -> tuple[Values, Values]:
+def _by_level(detail: Doubles, level: Doubles, rounding: Doubles) -> tuple[Doubles, Doubles]:
     """Return LEVELS levels, and the variance there that differences show, each as large as noise at its level makes it;
     ``rounding`` is the squared distance of codes."""
     detail, level, rounding = detail.ravel() ** 2, level.ravel(), rounding.ravel() / 12
@@ -110,7 +109,7 @@ def _by_level(detail: Values, level: Values, rounding: Values) -> tuple[Values, 
     return at, np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
 
 
-def _line(at: Values, found: Values) -> PlateNoise:
+def _line(at: Doubles, found: Doubles) -> PlateNoise:
     """Return the noise that grows with light as variances at levels do."""
     bright, darkest = at > BRIGHT * at.max(), int(np.argmin(at))
     if at.max() <= 0:  # no light anywhere
@@ -122,7 +121,7 @@ def _line(at: Values, found: Values) -> PlateNoise:
     return PlateNoise(read=read, photon=photon, dimness=dimness)
 
 
-def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) -> PlateNoise:
+def _lesser(alone: PlateNoise, at: Doubles, found: Doubles, *, dark_share: float) -> PlateNoise:
     """Return the noise under light of single plates, or of what is left over of all (``found`` at the levels ``at``)
     where that is less: detail only ever adds to it.
 
@@ -145,7 +144,7 @@ def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) 
 
 def _fine(
     plate: Samples | Mixture, number: int, black_level: float, scale: float, pixels: int
-) -> tuple[Values, Values, Values]:
+) -> tuple[Doubles, Doubles, Doubles]:
     """Return second differences, whose squares white noise makes as large as its variance, the level there, and the
     squared distance of the plate's codes, 0 where it holds none.
 
@@ -173,7 +172,7 @@ def _fine(
     return fine, level, gaps[1, :, 1:-1].ravel()[::each] ** 2
 
 
-def _differences(lines: NDArray[np.floating], each: int) -> tuple[Values, Values]:
+def _differences(lines: NDArray[np.floating], each: int) -> tuple[Doubles, Doubles]:
     """Return of ``lines`` (3, line, col), of which three lie beside each other, the second differences as their squares
     hold the variance, and the levels there; of every ``each``-th place."""
     top, middle, bottom = lines
@@ -183,7 +182,7 @@ def _differences(lines: NDArray[np.floating], each: int) -> tuple[Values, Values
     return fine.ravel()[::each] / np.float64(6), level.ravel()[::each] / np.float64(9)
 
 
-def _codes_in(values: NDArray[np.floating]) -> Values | None:
+def _codes_in(values: NDArray[np.floating]) -> Doubles | None:
     """Return the codes that values are, in rising order, or None where they are none that a file rounded."""
     some = values.ravel()[:: max(values.size // CODE_SAMPLES, 1)]
     codes = np.unique(some).astype(np.float64)
@@ -197,7 +196,7 @@ def _codes_in(values: NDArray[np.floating]) -> Values | None:
     return codes
 
 
-def _gaps_between(codes: Values, values: Values) -> Values:
+def _gaps_between(codes: Doubles, values: Doubles) -> Doubles:
     """Return how far from each other codes are at every value."""
     gaps = np.diff(codes)
     beside = np.pad(gaps, 1, mode="edge")

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from psvideo.model.arrays import Floats, Mask
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Subject, Surface
 from psvideo.plates.mixing.mixture import Mixture
@@ -18,7 +19,7 @@ from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import LIGHTS_FOR_REFLECTANCE
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
-from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
+from psvideo.solve.normals.task import Looks, Samples, Usable
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import Judging, emptied, judged, with_unchecked
 

@@ -10,15 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Bytes, Doubles, Floats, Mask
 from psvideo.model.rows.clipping import ROUNDING
 from psvideo.solve.normals.illumination import Illumination
 
-Floats = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
 Samples = NDArray[Any]  # of float32 or uint16
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.uint32]
 
 PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
 
@@ -247,7 +243,7 @@ def let_rows_go(result: Result, cols: int, first: int, last: int) -> None:
     let_go(*(plane[part] for plane in (*result.normals, *result.albedo, result.residual)))
 
 
-def _filled(values: FloatArray, copies: int, *, mode: Literal["constant", "edge"] = "constant") -> Floats:
+def _filled(values: Doubles, copies: int, *, mode: Literal["constant", "edge"] = "constant") -> Floats:
     filled = np.pad(values, ((0, copies), *[(0, 0)] * (values.ndim - 1)), mode=mode)
     return np.ascontiguousarray(filled, np.float32)
 

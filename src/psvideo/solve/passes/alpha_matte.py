@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
+from psvideo.model.arrays import Floats, Mask
 from psvideo.model.channels import mean_of_channels
 from psvideo.solve.filling.filled import holes_in
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise
 from psvideo.solve.normals.solving import CERTAIN
-from psvideo.solve.normals.task import Mask
 from psvideo.solve.passes.plate_rows import PlateRows
 
-Floats = NDArray[np.float32]
 SEPARATE, TIMES_BRIGHTER = 0.7, 6.0
 """Two heaps are separate from this share of the variance between them on, where their middles differ this much. (A
 subject before a black curtain: 0.94 and 12 to 34; before a lit wall: 0.5 to 0.8, but 1.5 to 3.8.)"""

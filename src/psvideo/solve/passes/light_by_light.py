@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.ground import every_ray
 from psvideo.model.irradiance.near_light import near_vectors
@@ -17,10 +17,8 @@ from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.solving import CERTAIN, INDIRECT
-from psvideo.solve.normals.task import Mask
 from psvideo.solve.passes.plate_rows import PlateRows
 
-Floats = NDArray[np.float32]
 SHADOWED = 1 / 3
 """Below this share of what the light would give unhindered, a pixel lies in its shadow: the rest comes from around."""
 
@@ -61,7 +59,7 @@ def _sent(lit: Illumination, light: int, first: int, last: int) -> Floats:
     ground = field.ground
     x, y = every_ray(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
     depth_m = ground.depth_m[first:last].astype(np.float64)
-    points_m: FloatArray = np.stack([x * depth_m, y[first:last] * depth_m, -depth_m], axis=-1)
+    points_m: Doubles = np.stack([x * depth_m, y[first:last] * depth_m, -depth_m], axis=-1)
     sent = near_vectors(points_m, field.positions_m[light], axis=field.axes[light], anisotropy=field.anisotropy[light])
     return np.asarray(sent / field.middle_gain[light], np.float32)
 

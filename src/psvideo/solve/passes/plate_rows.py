@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Floats, Mask
 from psvideo.plates.mixing.mixture import Mixture, Reader, mixture_of
-from psvideo.solve.normals.task import Mask, Samples
+from psvideo.solve.normals.task import Samples
 
-Floats = NDArray[np.float32]
 BAND_PIXELS = 1 << 15
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import FlashTrain, Plan
 
 
@@ -32,17 +32,17 @@ class FoundClock:
         offset_ppm = self.offset_ppm + ppm * self.rate
         return FoundClock(phase_s=phase_s, offset_ppm=offset_ppm, knot_s=self.knot_s, bend_s=self.bend_s)
 
-    def bent(self, knot_s: FloatArray, shift_s: FloatArray) -> "FoundClock":
+    def bent(self, knot_s: Doubles, shift_s: Doubles) -> "FoundClock":
         """Return this clock with ``shift_s`` (knot,) added to its bends at the given knots."""
         before_s = self.bend(knot_s)
         return replace(self, knot_s=tuple(float(t) for t in knot_s), bend_s=tuple(float(t) for t in before_s + shift_s))
 
-    def bend(self, time_s: FloatArray) -> FloatArray:
+    def bend(self, time_s: Doubles) -> Doubles:
         """Return the bend at times on the unbent clock, same shape; straight on beyond the last knots."""
         if not self.knot_s:
             return np.zeros_like(time_s)
         knot_s, bend_s = np.array(self.knot_s), np.array(self.bend_s)
-        inside: FloatArray = np.interp(time_s, knot_s, bend_s)
+        inside: Doubles = np.interp(time_s, knot_s, bend_s)
         if len(knot_s) > 1:
             slope = np.diff(bend_s) / np.diff(knot_s)
             inside = inside + slope[0] * np.minimum(time_s - knot_s[0], 0.0)

@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.model.arrays import Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import Mask, stood_in
+from psvideo.sync.rowfit.coarse.retime import stood_in
 from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, explained
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
@@ -59,7 +59,7 @@ class ClipFit:
     steps: int
     strayed: int
     trusted: tuple[int, int]
-    unsure: IntArray
+    unsure: Integers
     slack_s: float = 0.0
     soft_s: float = 0.0
     unsteady_s: float = 0.0

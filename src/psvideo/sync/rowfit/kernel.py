@@ -7,7 +7,7 @@ and Pereyra 1973). What remains are times; ``projection`` says which way they ar
 import numpy as np
 
 from psvideo.compute.compiled import EXACT
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.sync.rowfit.row_model import (
     Flashes,
     Rows,
@@ -21,7 +21,7 @@ RIDGE = 1e-6
 
 
 @EXACT.kept
-def factor(matrix: FloatArray, size: int) -> None:
+def factor(matrix: Doubles, size: int) -> None:
     """Replace the lower half of a symmetric positive definite matrix by its Cholesky factor."""
     for i in range(size):
         matrix[i, i] += RIDGE * matrix[i, i] + 1e-30
@@ -33,7 +33,7 @@ def factor(matrix: FloatArray, size: int) -> None:
 
 
 @EXACT.kept
-def solve_factored(matrix: FloatArray, right: FloatArray, size: int) -> None:
+def solve_factored(matrix: Doubles, right: Doubles, size: int) -> None:
     """Solve with a Cholesky factor; the answer stands in ``right``."""
     for i in range(size):
         for m in range(i):
@@ -47,13 +47,13 @@ def solve_factored(matrix: FloatArray, right: FloatArray, size: int) -> None:
 
 @EXACT.kept
 def fit_window(
-    value: FloatArray,
-    weight: FloatArray,
-    design: FloatArray,
+    value: Doubles,
+    weight: Doubles,
+    design: Doubles,
     first: int,
     last: int,
-    normal: FloatArray,
-    right: FloatArray,
+    normal: Doubles,
+    right: Doubles,
 ) -> None:
     """Fit one row's brightnesses over some frames: ``normal`` ends as a Cholesky factor, ``right`` as the answer."""
     size = design.shape[1]
@@ -71,7 +71,7 @@ def fit_window(
 
 
 @EXACT.kept
-def row_rest(rows: Rows, flashes: Flashes, weight: FloatArray, row: int, design: FloatArray, rest: FloatArray) -> None:
+def row_rest(rows: Rows, flashes: Flashes, weight: Doubles, row: int, design: Doubles, rest: Doubles) -> None:
     """Fill ``rest`` (frame,) with what one row's own brightnesses, fitted window by window, leave unexplained."""
     frames, size = design.shape
     normal, right = np.empty((size, size)), np.empty(size)
@@ -93,7 +93,7 @@ def row_rest(rows: Rows, flashes: Flashes, weight: FloatArray, row: int, design:
 
 
 @EXACT.kept
-def rests(rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, rest: FloatArray) -> None:
+def rests(rows: Rows, flashes: Flashes, weight: Doubles, first: int, last: int, rest: Doubles) -> None:
     """Fill the columns ``first`` to ``last`` of ``rest`` (frame, row)."""
     design = np.empty((len(rows.value), width(rows, flashes)))
     for row in range(first, last):
@@ -104,13 +104,13 @@ def rests(rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: in
 def losses_by_row(
     rows: Rows,
     flashes: Flashes,
-    phase_s: FloatArray,
-    rate: FloatArray,
-    spread: FloatArray,
+    phase_s: Doubles,
+    rate: Doubles,
+    spread: Doubles,
     steepness: float,
     first: int,
     last: int,
-    found: FloatArray,
+    found: Doubles,
 ) -> None:
     """Fill ``found`` (clock, row) with the robust loss of every clock in every row."""
     frames, height = rows.value.shape
@@ -137,7 +137,7 @@ def losses_by_row(
 
 
 @EXACT.kept
-def brightnesses(rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, found: FloatArray) -> None:
+def brightnesses(rows: Rows, flashes: Flashes, weight: Doubles, first: int, last: int, found: Doubles) -> None:
     """Fill ``found`` (row, unknown) with the brightnesses fitted over all frames as one window."""
     size = flashes.unknowns + 2 * len(rows.beat_hz)
     design = np.empty((len(rows.value), size))

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
@@ -68,7 +68,7 @@ def throughout(
     )
 
 
-def _through(rough: Beat, beat: Beat, at_s: FloatArray) -> FoundClock:
+def _through(rough: Beat, beat: Beat, at_s: Doubles) -> FoundClock:
     """Return a rough clock moved and turned to another that is known at some times, as tails move all flashes."""
     line = np.polyfit(at_s, late_s(rough, beat, at_s), 1)
     pivot_s = float(at_s.mean())
@@ -81,7 +81,7 @@ def clocks_of_chapters(plan: Plan, rows: Profiles, start: Beat) -> tuple[Beat, f
     A chapter that does not show its clock is bridged from those beside it.
     """
     shortest_s = plan.shortest_flash_s
-    at_s, bend_s, squares = list[FloatArray](), list[FloatArray](), list[float]()
+    at_s, bend_s, squares = list[Doubles](), list[Doubles](), list[float]()
     for chapter in _chapters(rows):
         part = rows.take(chapter)
         ends_s = part.ends_s

@@ -11,12 +11,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from psvideo.model.arrays import Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, refine, refined_beat, robust_loss
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 
@@ -87,7 +87,7 @@ def between_lone_ends(found: ClipFit) -> slice | None:
     return None if nothing else slice(first, end)
 
 
-def _breaks(stray: IntArray) -> Iterator[_Break]:
+def _breaks(stray: Integers) -> Iterator[_Break]:
     """Yield the breaks that many missing or repeated frames bridge; ``stray`` (frame,) is how many each is behind."""
     edges = [0, *(np.flatnonzero(np.diff(stray)) + 1).tolist(), len(stray)]
     runs = [slice(a, b) for a, b in pairwise(edges) if b - a >= LEAST]

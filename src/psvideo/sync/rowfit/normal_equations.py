@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, equations
@@ -17,21 +17,21 @@ class Projected(NamedTuple):
     """Residuals ``rest`` (frame, row), the normal matrix ``hessian`` and scores in the unknowns of a basis, apart by
     ``scores`` (frame, unknown) and ``at_place`` (place, unknown)."""
 
-    rest: FloatArray
-    hessian: FloatArray
-    scores: FloatArray
-    at_place: FloatArray
+    rest: Doubles
+    hessian: Doubles
+    scores: Doubles
+    at_place: Doubles
 
 
 def projected(
     plan: Plan,
     rows: Profiles,
     beat: Beat,
-    weight: FloatArray,
-    basis: FloatArray,
+    weight: Doubles,
+    basis: Doubles,
     *,
     tails: bool,
-    steepness: FloatArray | None = None,
+    steepness: Doubles | None = None,
 ) -> Projected:
     """Return the normal equations in the unknowns of a basis; ``at_place`` is empty without ``steepness``."""
     found = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
@@ -50,7 +50,7 @@ def projected(
     return Projected(found.rest, hessian, scores, at_place)
 
 
-def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+def solved(matrix: Doubles, right: Doubles) -> Doubles:
     """Return what a normal matrix times the result is; it is damped (Marquardt 1963) only where it has no inverse.
 
     A strobe in step with the frames shows one edge again and again: shift and slope are then one unknown.

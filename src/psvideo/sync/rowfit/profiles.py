@@ -7,12 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.rowfit import kernel, projection, row_model
 from psvideo.sync.rowfit.beat import Beat, train_between
-from psvideo.sync.rowfit.row_model import IntArray
 
 WORTH_A_THREAD = 40_000
 """Samples of one part of the work; with fewer, starting a thread costs more than it saves."""
@@ -28,18 +27,18 @@ class Profiles:
     differ in each row, as variance over the noise's; none: all are alike.
     """
 
-    value: FloatArray
-    index: IntArray
+    value: Doubles
+    index: Integers
     period_s: float
-    place: FloatArray
-    window_start: IntArray
-    doubt: FloatArray | None = None
-    restless: FloatArray | None = None
+    place: Doubles
+    window_start: Integers
+    doubt: Doubles | None = None
+    restless: Doubles | None = None
 
     @property
-    def frame_start_s(self) -> FloatArray:
+    def frame_start_s(self) -> Doubles:
         """When each frame's first row opens, shape (frame,)."""
-        start_s: FloatArray = np.asarray(self.index, np.float64) * self.period_s
+        start_s: Doubles = np.asarray(self.index, np.float64) * self.period_s
         return start_s
 
     def take(self, frames: slice) -> "Profiles":
@@ -110,20 +109,20 @@ class Profiles:
         )
 
     @property
-    def spread(self) -> FloatArray:
+    def spread(self) -> Doubles:
         """How much each row changes over time, shape (row,); rows in the dark are held at a thousandth."""
         spread = self.value.std(axis=0)
-        held: FloatArray = np.maximum(spread, 1e-3 * spread.max() + 1e-12)
+        held: Doubles = np.maximum(spread, 1e-3 * spread.max() + 1e-12)
         return held
 
     @property
-    def ends_s(self) -> FloatArray:
+    def ends_s(self) -> Doubles:
         """Where each window begins and the last one ends, shape (window + 1,)."""
         start_s = self.frame_start_s
         return np.append(start_s[self.window_start], start_s[-1] + self.period_s)
 
 
-def slot_unknowns(plan: Plan) -> IntArray:
+def slot_unknowns(plan: Plan) -> Integers:
     """Return which brightness each slot shows: 1, 2, … for the lit slots, 0 for dark ones."""
     number = np.zeros(len(plan.flashes), np.int64)
     number[list(plan.lit_slots)] = np.arange(1, len(plan.lit_slots) + 1)
@@ -162,7 +161,7 @@ def compiled_flashes(plan: Plan, rows: Profiles, beat: Beat) -> row_model.Flashe
     )
 
 
-def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:
+def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: Doubles | None = None) -> Doubles:
     """Return the residuals (frame, row) that the best brightnesses leave; ``weight`` is the trust in each sample."""
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     trust = np.ones_like(rows.value) if weight is None else weight
@@ -179,20 +178,20 @@ class TimeEquations(NamedTuple):
     """Residuals ``rest`` (frame, row), normal matrices ``windows`` (window, signal, signal), and scores, apart by
     ``frame`` (frame, signal) and by ``place`` in a flash (window, place, signal)."""
 
-    rest: FloatArray
-    windows: FloatArray
-    frame: FloatArray
-    place: FloatArray
+    rest: Doubles
+    windows: Doubles
+    frame: Doubles
+    place: Doubles
 
 
 def equations(
     plan: Plan,
     rows: Profiles,
     beat: Beat,
-    weight: FloatArray,
+    weight: Doubles,
     *,
     tails: bool,
-    steepness: FloatArray | None = None,
+    steepness: Doubles | None = None,
 ) -> TimeEquations:
     """Return the normal equations of the times.
 
@@ -207,7 +206,7 @@ def equations(
     if honest:
         row_model.places(seen, flashes, place)
 
-    def run(first: int, last: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def run(first: int, last: int) -> tuple[Doubles, Doubles, Doubles]:
         hessian = np.zeros((len(rows.window_start), row_model.SIGNALS, row_model.SIGNALS))
         score = np.zeros((len(rows.value), row_model.SIGNALS))
         apart = np.zeros((len(rows.window_start), row_model.PLACES if honest else 0, row_model.SIGNALS))
@@ -222,7 +221,7 @@ def equations(
     return TimeEquations(rest, full, score, apart)
 
 
-def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:
+def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: Doubles | None = None) -> Doubles:
     """Return every row's brightnesses, fitted over all frames together, shape (row, unknown)."""
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     trust = np.ones_like(rows.value) if weight is None else weight
@@ -231,7 +230,7 @@ def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | No
     return found
 
 
-def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: FloatArray) -> FloatArray:
+def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: Doubles) -> Doubles:
     """Return the profiles (frame, row) that known brightnesses (row, unknown) give at the times of ``rows``."""
     found = np.empty_like(rows.value)
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
@@ -239,7 +238,7 @@ def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: FloatArray) 
     return found
 
 
-def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray) -> FloatArray:
+def residuals_of(plan: Plan, timing: Timing, index: Integers, value: Doubles) -> Doubles:
     """Return what a timing that was found leaves of profiles (frame, row), with brightnesses that hold throughout."""
     height = value.shape[1]
     upward = timing.row_time_s < 0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.sync.rowfit.kernel import fit_window, solve_factored
 from psvideo.sync.rowfit.row_model import BLUR, LEFT, RIGHT, RISE, SIGNALS, Flashes, Rows, given_off, see, slopes, width
 from psvideo.sync.rowfit.unknowns.whitening import factors, whiten, whiten_all
@@ -18,7 +18,7 @@ MOST_LEVERAGE = 0.9
 
 
 @EXACT.called
-def leverage(normal: FloatArray, design: FloatArray, weight: float, size: int, solved: FloatArray) -> float:
+def leverage(normal: Doubles, design: Doubles, weight: float, size: int, solved: Doubles) -> float:
     """Return which share of a sample's own error the brightnesses that are fitted to it take up."""
     taken = 0.0
     for i in range(size):
@@ -37,9 +37,9 @@ def _fill_signals(
     row: int,
     window: int,
     first_flash: NDArray[np.int64],
-    right: FloatArray,
+    right: Doubles,
     tails: bool,
-    signals: FloatArray,
+    signals: Doubles,
 ) -> None:
     """Fill the window's ``signals`` (frame, SIGNALS): how a row's samples change with each time that may be free."""
     span_s = rows.ends_s[window + 1] - rows.ends_s[window]
@@ -52,14 +52,14 @@ def _fill_signals(
 
 @EXACT.inlined
 def _project(
-    design: FloatArray,
-    weight: FloatArray,
+    design: Doubles,
+    weight: Doubles,
     first: int,
     last: int,
-    normal: FloatArray,
+    normal: Doubles,
     used: int,
-    cross: FloatArray,
-    signals: FloatArray,
+    cross: Doubles,
+    signals: Doubles,
 ) -> None:
     """Leave of the first ``used`` signals of some frames what other brightnesses could not bring about as well."""
     size = design.shape[1]
@@ -82,17 +82,17 @@ def _project(
 def equations(
     rows: Rows,
     flashes: Flashes,
-    weight: FloatArray,
-    steepness: FloatArray,
+    weight: Doubles,
+    steepness: Doubles,
     tails: bool,
     honest: bool,
     first: int,
     last: int,
-    rest: FloatArray,
-    hessian: FloatArray,
-    score: FloatArray,
+    rest: Doubles,
+    hessian: Doubles,
+    score: Doubles,
     place: NDArray[np.int64],
-    at_place: FloatArray,
+    at_place: Doubles,
 ) -> None:
     """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), and their ``weight *
     signal * rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. Unless ``at_place`` (window, place,
@@ -148,9 +148,7 @@ def equations(
 
 
 @EXACT.kept
-def edges(
-    rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, pull: FloatArray, stiff: FloatArray
-) -> None:
+def edges(rows: Rows, flashes: Flashes, weight: Doubles, first: int, last: int, pull: Doubles, stiff: Doubles) -> None:
     """Add to ``pull`` and ``stiff`` (flash, 2) how strongly rows that open (0) or close (1) during a flash shift it."""
     frames = len(rows.value)
     design = np.empty((frames, width(rows, flashes)))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.normal_equations import projected, solved
@@ -34,8 +34,8 @@ class Fit:
     ``alike_s`` is as in ``Believable``."""
 
     beat: Beat
-    rest: FloatArray
-    weight: FloatArray
+    rest: Doubles
+    weight: Doubles
     shift_error_s: float
     errors_s: dict[str, float]
     explained: float
@@ -51,9 +51,9 @@ class _Stepped(NamedTuple):
     """Where robust steps end: the beat, what it leaves, and each sample's weight and the trust in it (frame, row)."""
 
     beat: Beat
-    rest: FloatArray
-    weight: FloatArray
-    trust: FloatArray
+    rest: Doubles
+    weight: Doubles
+    trust: Doubles
 
 
 def refine(
@@ -156,7 +156,7 @@ def _may_move(rows: Profiles, beat: Beat, name: str, move: float) -> bool:
     return name != "exposure_s" or beat.exposure_s < rows.period_s * (1 - 1e-9)
 
 
-def _straight(rows: Profiles, free: tuple[str, ...]) -> FloatArray:
+def _straight(rows: Profiles, free: tuple[str, ...]) -> Doubles:
     """Return the columns by which shift and slope move the knots, and each free time itself."""
     ends_s = rows.ends_s
     pivot_s, half_s = _pivot(rows)
@@ -173,13 +173,13 @@ def _pivot(rows: Profiles) -> tuple[float, float]:
     return float(start_s.mean()), max(float(start_s[-1] - start_s[0]) / 2, rows.period_s)
 
 
-def _units(plan: Plan, rows: Profiles, free: tuple[str, ...]) -> FloatArray:
+def _units(plan: Plan, rows: Profiles, free: tuple[str, ...]) -> Doubles:
     """Return a fiftieth of a flash in every unknown, which is small for all of them."""
     shortest_s = 0.02 * plan.shortest_flash_s
     return np.array([shortest_s] * 2 + [shortest_s / (rows.place.max() if n == "row_time_s" else 1.0) for n in free])
 
 
-def prior(unit_s: FloatArray, free: tuple[str, ...]) -> FloatArray:
+def prior(unit_s: Doubles, free: tuple[str, ...]) -> Doubles:
     """Return the precision of what is known beforehand: free times stay within a few flashes of where they are."""
     known = np.zeros((len(unit_s), len(unit_s)))
     for n in range(len(free)):
@@ -187,11 +187,11 @@ def prior(unit_s: FloatArray, free: tuple[str, ...]) -> FloatArray:
     return known + 1e-12 * np.diag(unit_s**-2.0)
 
 
-def _held(plan: Plan, move: FloatArray) -> FloatArray:
+def _held(plan: Plan, move: Doubles) -> Doubles:
     """Take no step of more than a third of a flash."""
     longest_s = 0.33 * plan.shortest_flash_s
     largest_s = float(np.abs(move[:2]).max())
-    held: FloatArray = move * min(1.0, longest_s / max(largest_s, 1e-30))
+    held: Doubles = move * min(1.0, longest_s / max(largest_s, 1e-30))
     return held
 
 
@@ -200,10 +200,10 @@ def _step(
     rows: Profiles,
     beat: Beat,
     free: tuple[str, ...],
-    move: FloatArray,
-    weight: FloatArray,
-    rest: FloatArray,
-) -> tuple[Beat, FloatArray, bool]:
+    move: Doubles,
+    weight: Doubles,
+    rest: Doubles,
+) -> tuple[Beat, Doubles, bool]:
     """Take a step, halved until it explains more; say whether it did."""
     loss = float((weight * rest**2).sum())
     for _ in range(5):
@@ -215,13 +215,13 @@ def _step(
     return beat, rest, False
 
 
-def _moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatArray) -> Beat:
+def _moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: Doubles) -> Beat:
     pivot_s, half_s = _pivot(rows)
     clock = beat.clock.shifted(float(move[0]), float(move[1]) / half_s * 1e6, pivot_s=pivot_s)
     return replace(beat, clock=clock, **times_moved(rows, beat, free, move[2:]))
 
 
-def times_moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatArray) -> dict[str, Any]:
+def times_moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: Doubles) -> dict[str, Any]:
     """Return the times named in ``free`` after a step, within the bounds of what a camera and LEDs can do."""
     times_s = {name: max(getattr(beat, name) + float(move[n]), 0.0) for n, name in enumerate(free)}
     if "exposure_s" in times_s:
@@ -233,7 +233,7 @@ def times_moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatAr
     return times_s
 
 
-def errors_of_residuals(rows: Profiles, rest: FloatArray, share: float) -> FloatArray:
+def errors_of_residuals(rows: Profiles, rest: Doubles, share: float) -> Doubles:
     """Return how far each residual may be off: noise, at first a share of the row's spread, and what is doubtful."""
     scale = np.maximum(row_noise(rest), rows.spread * max(share, LAST_SCALE))
     if rows.doubt is None:
@@ -241,19 +241,19 @@ def errors_of_residuals(rows: Profiles, rest: FloatArray, share: float) -> Float
     return np.sqrt(scale**2 + rows.doubt**2)
 
 
-def row_noise(rest: FloatArray) -> FloatArray:
+def row_noise(rest: Doubles) -> Doubles:
     """Return each row's own residual spread (from the median, so that outliers do not count), shape (row,)."""
     spread = 1.4826 * np.median(np.abs(rest), axis=0)
-    noise: FloatArray = np.maximum(spread, 0.1 * np.median(spread) + 1e-9)
+    noise: Doubles = np.maximum(spread, 0.1 * np.median(spread) + 1e-9)
     return noise
 
 
-def robust_loss(rows: Profiles, rest: FloatArray, reference: FloatArray) -> float:
+def robust_loss(rows: Profiles, rest: Doubles, reference: Doubles) -> float:
     """Return Cauchy's loss of residuals against the noise of ``reference`` residuals."""
     return float(np.log1p((rest / (CAUCHY * errors_of_residuals(rows, reference, 0.0))) ** 2).sum())
 
 
-def explained(rows: Profiles, rest: FloatArray) -> float:
+def explained(rows: Profiles, rest: Doubles) -> float:
     """Return which share of the rows' changes from frame to frame a fit explains."""
     change = rows.value - rows.value.mean(axis=0)
     return 1.0 - float((rest**2).sum() / max(float((change**2).sum()), 1e-30))

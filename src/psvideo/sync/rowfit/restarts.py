@@ -11,16 +11,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import Mask, stood_in
+from psvideo.sync.rowfit.coarse.retime import stood_in
 from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.strobed import least_frames, lost_somewhere, shows_strobe
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, memory_frames, window_frames
 from psvideo.sync.rowfit.tracking.holes import MEMORY, settled
@@ -122,7 +121,7 @@ def _restart_in(plan: Plan, rows: Profiles) -> int | None:
     return None if at is None else int(frames[at])
 
 
-def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, extra: IntArray, sign: int) -> int | None:
+def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, extra: Integers, sign: int) -> int | None:
     """Return which frame ahead of those that are known is the first after a restart; None where none is.
 
     ``extra`` (frame,) is by how many frames more than numbered the best course of missing frames puts those ahead
@@ -179,10 +178,10 @@ def _lost(plan: Plan, rows: Profiles, beat: Beat, ahead: slice, sign: int, odd: 
     return at if 0 < at < len(rows.value) else None
 
 
-def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> float:
+def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: Doubles) -> float:
     """Return by how much frames must come later for known brightnesses to predict them best, within one cycle."""
 
-    def best_s(shifts_s: FloatArray) -> float:
+    def best_s(shifts_s: Doubles) -> float:
         losses = [float(losses_of(plan, learnt, moved(rows, one), beat, light).sum()) for one in shifts_s.tolist()]
         return float(shifts_s[int(np.argmin(losses))])
 
@@ -192,11 +191,11 @@ def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat,
     return best_s(rough_s + np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS / PARTS * shortest_s)
 
 
-def _least_losses(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+def _least_losses(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: Doubles) -> Doubles:
     """Return how badly known brightnesses predict each frame at its best place in the cycle, shape (frame,)."""
     shifts_s = np.arange(0.0, plan.cycle_s * beat.clock.rate, plan.shortest_flash_s / PARTS)
     losses = [losses_of(plan, learnt, moved(rows, one), beat, light) for one in shifts_s.tolist()]
-    least: FloatArray = np.min(losses, axis=0)
+    least: Doubles = np.min(losses, axis=0)
     return least
 
 

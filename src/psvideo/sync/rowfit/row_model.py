@@ -9,13 +9,10 @@ scaling blur rows as if every flash were spread out evenly to either side, which
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.rows.shutter import REACH
-
-IntArray = NDArray[np.int64]
 
 OVER = 40.0
 """After this many, double precision cannot tell that it is not."""
@@ -33,26 +30,26 @@ PLACES = 2 * PARTS + 1
 class Rows(NamedTuple):
     """Profiles as compiled code takes them. ``row_place`` counts rows from the first that opens."""
 
-    value: FloatArray
-    frame_start_s: FloatArray
-    row_place: FloatArray
+    value: Doubles
+    frame_start_s: Doubles
+    row_place: Doubles
     row_time_s: float
     exposure_s: float
-    bounds: IntArray
-    ends_s: FloatArray
+    bounds: Integers
+    ends_s: Doubles
     """Where each window begins and the last one ends, on the camera's clock: the shift is linear in between."""
-    beat_hz: FloatArray
+    beat_hz: Doubles
     """Frequencies at which ambient light may flicker."""
-    restless: FloatArray
+    restless: Doubles
     """By how much a light's flashes differ in each row (row,), as variance over the noise's; 0 where all are alike."""
 
 
 class Flashes(NamedTuple):
     """A train of flashes. ``unknown`` numbers each flash's brightness from 1, 0 for a dark slot."""
 
-    start_s: FloatArray
-    duration_s: FloatArray
-    unknown: IntArray
+    start_s: Doubles
+    duration_s: Doubles
+    unknown: Integers
     unknowns: int
     rise_s: float
     fall_s: float
@@ -99,7 +96,7 @@ def width(rows: Rows, flashes: Flashes) -> int:
 
 
 @EXACT.kept
-def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: FloatArray) -> int:
+def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Doubles) -> int:
     """Fill ``design`` (unknown,) with what a row saw in a frame; return the first flash that may matter to the next."""
     design[:] = 0.0
     design[0] = 1.0
@@ -132,7 +129,7 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
 
 
 @EXACT.kept
-def places(rows: Rows, flashes: Flashes, found: IntArray) -> None:
+def places(rows: Rows, flashes: Flashes, found: Integers) -> None:
     """Fill ``found`` (frame, row) with the part of a flash in which each row opens or closes, below ``PLACES``.
 
     A flash lasts here until its tail has fallen to 1/e; where a row opens in one and closes in another, it opens.
@@ -158,7 +155,7 @@ def places(rows: Rows, flashes: Flashes, found: IntArray) -> None:
 
 
 @EXACT.called
-def see_all(rows: Rows, flashes: Flashes, row: int, design: FloatArray) -> None:
+def see_all(rows: Rows, flashes: Flashes, row: int, design: Doubles) -> None:
     """Fill ``design`` (frame, unknown) with what a row saw in every frame, as ``see`` does frame by frame."""
     if flashes.rise_s == 0.0 and flashes.fall_s == 0.0 and flashes.blur_s == 0.0 and len(rows.beat_hz) == 0:
         _see_sharp(rows.frame_start_s, rows.row_place[row] * rows.row_time_s, rows.exposure_s, flashes, design)
@@ -169,9 +166,7 @@ def see_all(rows: Rows, flashes: Flashes, row: int, design: FloatArray) -> None:
 
 
 @EXACT.called
-def _see_sharp(
-    frame_start_s: FloatArray, offset_s: float, exposure_s: float, flashes: Flashes, design: FloatArray
-) -> None:
+def _see_sharp(frame_start_s: Doubles, offset_s: float, exposure_s: float, flashes: Flashes, design: Doubles) -> None:
     """Fill ``design`` where flashes are square pulses and nothing flickers, which most searches try."""
     start_s, duration_s, unknown = flashes.start_s, flashes.duration_s, flashes.unknown
     count, size = len(start_s), design.shape[1]
@@ -194,7 +189,7 @@ def _see_sharp(
 
 @EXACT.kept
 def slopes(
-    rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: FloatArray, tails: bool, signals: FloatArray
+    rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: Doubles, tails: bool, signals: Doubles
 ) -> float:
     """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
@@ -253,7 +248,7 @@ def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float
 
 
 @EXACT.kept
-def predictions(rows: Rows, flashes: Flashes, brightness: FloatArray, first: int, last: int, found: FloatArray) -> None:
+def predictions(rows: Rows, flashes: Flashes, brightness: Doubles, first: int, last: int, found: Doubles) -> None:
     """Fill ``found`` (frame, row) with what known brightnesses (row, unknown) give."""
     frames, size = len(rows.value), width(rows, flashes)
     design = np.empty((frames, size))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.normal_equations import projected, solved
@@ -26,12 +26,12 @@ class Believable(NamedTuple):
     """The ``covariance`` of the unknowns, and ``alike_s``, the standard error of the flashes' times where residuals err
     alike at the same places of flashes by clearly more than they do in frames near one another, else 0."""
 
-    covariance: FloatArray
+    covariance: Doubles
     alike_s: float
 
 
 def believable(
-    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, trust: FloatArray, basis: FloatArray, known: FloatArray
+    plan: Plan, rows: Profiles, beat: Beat, weight: Doubles, trust: Doubles, basis: Doubles, known: Doubles
 ) -> Believable:
     """Return how certain the unknowns are at the end of a robust fit.
 
@@ -49,7 +49,7 @@ def believable(
     return Believable(covariance, alike_s if alike_s > CLEARLY_MORE * mean_error(knots, covariance) else 0.0)
 
 
-def _alike(hessian: FloatArray, at_place: FloatArray, known: FloatArray, *, unknowns: int) -> FloatArray:
+def _alike(hessian: Doubles, at_place: Doubles, known: Doubles, *, unknowns: int) -> Doubles:
     """Return the covariance of the unknowns if residuals err alike wherever rows open or close at the same place of a
     flash, as where edges are compressed; 0 where rows do so at few places. Of ``unknowns``, a clock's bends count as
     none: places are spread over the whole clip."""
@@ -58,11 +58,11 @@ def _alike(hessian: FloatArray, at_place: FloatArray, known: FloatArray, *, unkn
     if left < LEAST_LEFT:
         return np.zeros_like(known)
     bread = solved(hessian + known, np.eye(len(known)))
-    covariance: FloatArray = bread @ (seen.T @ seen) @ bread * len(seen) / left
+    covariance: Doubles = bread @ (seen.T @ seen) @ bread * len(seen) / left
     return covariance
 
 
-def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
+def sandwich(hessian: Doubles, scores: Doubles, known: Doubles) -> Doubles:
     """Return the covariance of the unknowns, true also where frames near one another err together.
 
     Of several estimates, each right under other correlations, the one that claims least certainty is taken.
@@ -80,7 +80,7 @@ def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> Floa
     return max(errors, key=lambda covariance: float(covariance[0, 0]))
 
 
-def mean_error(knots: FloatArray, covariance: FloatArray) -> float:
+def mean_error(knots: Doubles, covariance: Doubles) -> float:
     """Return the root of the mean variance over the knots."""
     return float(np.sqrt(max(np.mean(np.einsum("ka,ab,kb->k", knots, covariance, knots)), 0.0)))
 

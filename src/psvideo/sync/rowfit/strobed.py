@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
@@ -51,7 +51,7 @@ def lost_somewhere(plan: Plan, found: ClipFit) -> bool:
     )
 
 
-def _one_stands_out(plan: Plan, rows: Profiles, beat: Beat, shifts_s: FloatArray, others_s: FloatArray) -> bool:
+def _one_stands_out(plan: Plan, rows: Profiles, beat: Beat, shifts_s: Doubles, others_s: Doubles) -> bool:
     """Return whether the best of some shifts explains the rows' changes, or clearly more than others do."""
     rows = replace(rows.one_window(), doubt=None)
 

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from psvideo.model.arrays import Integers, Mask
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, Mask, twins
+from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, twins
 from psvideo.sync.rowfit.profiles import Profiles, slot_unknowns
-from psvideo.sync.rowfit.row_model import IntArray
 
 DARK, FLOOR = 0.02, 0.02
 """A frame is dark whose rows lie above their darkest, a quantile of each, by less than half this share of their spreads
@@ -72,14 +72,14 @@ def _longest_run(plan: Plan, rows: Profiles, times: int) -> int:
     return times * (int(_longest_dark_s(plan) / rows.period_s) + 1)
 
 
-def with_unlit(rows: Profiles, index: IntArray, unlit: Mask) -> IntArray:
+def with_unlit(rows: Profiles, index: Integers, unlit: Mask) -> Integers:
     """Return the places in time of all frames (frame,) from those that are lit; others follow the ones before them."""
     every = np.arange(len(unlit))
     before = np.maximum.accumulate(np.where(unlit, -1, every))
     before = np.where(before < 0, int(np.argmin(unlit)), before)
     places = np.empty(len(unlit), np.int64)
     places[~unlit] = index
-    found: IntArray = places[before] + rows.index - rows.index[before]
+    found: Integers = places[before] + rows.index - rows.index[before]
     return np.minimum.accumulate(found[::-1])[::-1]
 
 

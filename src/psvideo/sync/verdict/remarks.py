@@ -6,7 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.cost.in_step import IN_STEP, never_shown
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
@@ -174,7 +175,7 @@ def _exposure(plan: Plan, found: ClipFit) -> str:
     return ""
 
 
-def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[FloatArray, float]:
+def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[Doubles, float]:
     """Return every frame's gain (frame,) of its flashes, against the whole clip's brightnesses, and what gains explain
     of the rest. The light of the room has a gain of its own: it changes where a camera does not."""
     rows = replace(found.rows, doubt=None)
@@ -185,7 +186,7 @@ def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[FloatA
     room = np.broadcast_to(light[:, 0], expected.shape)
     parts = (expected - room, room)
 
-    def around(picture: FloatArray) -> FloatArray:
+    def around(picture: Doubles) -> Doubles:
         sums, width = (trust * picture).sum(axis=1), min(frames_each, len(rows.value))
         padded = np.pad(sums, width // 2, mode="edge")
         return np.convolve(padded, np.ones(width), mode="valid")[: len(sums)]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Image
 from psvideo.synth.camera.curves import CURVES, CameraCurve
 from psvideo.synth.camera.noise import Noise
-from psvideo.synth.camera.sensor import Image
 from psvideo.synth.scene import CameraTable, Kind
 
 COLOURS = {"R": 0, "G": 1, "B": 2}

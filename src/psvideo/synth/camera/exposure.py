@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Image
 from psvideo.model.plan import Plan
 from psvideo.synth.camera.noise import NOISELESS, Noise, frame_rng
-from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames, plates_by_slot
+from psvideo.synth.camera.sensor import MainsSwing, expose_frames, plates_by_slot
 from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, true_flashes
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.synth.camera.sensor import Image
+from psvideo.model.arrays import Image
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,14 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles, Image
+from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan
 from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.lamps.true_flashes import TrueFlash, row_opens_s
-
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +23,7 @@ class MainsSwing:
     hz: float = 0.0
     depth: float = 0.0
 
-    def mean(self, opens_s: FloatArray, exposure_s: float) -> FloatArray:
+    def mean(self, opens_s: Doubles, exposure_s: float) -> Doubles:
         """Return each row's mean ambient level over its exposure, 1 without mains."""
         if self.hz <= 0 or self.depth == 0:
             return np.ones_like(opens_s)
@@ -33,7 +31,7 @@ class MainsSwing:
         return 1.0 + self.depth * (np.cos(turn * opens_s) - np.cos(turn * (opens_s + exposure_s))) / (turn * exposure_s)
 
 
-def seen_share(camera: Camera, emission: Emission, flash: TrueFlash, frame: int) -> FloatArray:
+def seen_share(camera: Camera, emission: Emission, flash: TrueFlash, frame: int) -> Doubles:
     """Return which fraction of a flash each row of one frame records, shape (row,)."""
     since_s = frame * camera.frame_period_s + row_opens_s(camera) - flash.start_s
     closed = emission.share(since_s + camera.exposure_s, flash.duration_s, flash.bursts_s)
@@ -82,7 +80,7 @@ def expose_frames(
         yield image
 
 
-def _collect(image: Image, plate: Image, share: FloatArray) -> None:
+def _collect(image: Image, plate: Image, share: Doubles) -> None:
     """Add the share of a plate that each row saw, touching only the rows that saw any of it."""
     rows = np.flatnonzero(share > 0)
     if rows.size:
@@ -90,7 +88,7 @@ def _collect(image: Image, plate: Image, share: FloatArray) -> None:
         image[lit] += _per_row(share[lit], plate.shape) * plate[lit]
 
 
-def _per_row(values: FloatArray, shape: tuple[int, ...]) -> Image:
+def _per_row(values: Doubles, shape: tuple[int, ...]) -> Image:
     return values.astype(np.float32).reshape((-1,) + (1,) * (len(shape) - 1))
 
 

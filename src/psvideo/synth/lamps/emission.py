@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 Bursts = tuple[tuple[float, float], ...]
 
@@ -19,7 +19,7 @@ class Emission:
     rise_s: float = 0.0
     fall_s: float = 0.0
 
-    def energy(self, since_s: FloatArray, duration_s: float) -> FloatArray:
+    def energy(self, since_s: Doubles, duration_s: float) -> Doubles:
         """Return the energy given off up to ``since_s`` seconds after the drive's start, in seconds of full light.
 
         >>> float(Emission().energy(np.array(0.5), 2.0)), float(Emission().energy(np.array(9.0), 2.0))
@@ -40,7 +40,7 @@ class Emission:
         """Return the energy of the whole flash, tail included, in seconds of full light."""
         return float(self.energy(np.array(np.inf), duration_s))
 
-    def share(self, since_s: FloatArray, duration_s: float, bursts_s: Bursts = ()) -> FloatArray:
+    def share(self, since_s: Doubles, duration_s: float, bursts_s: Bursts = ()) -> Doubles:
         """Return the energy given off so far as a fraction of the whole flash's, 0 to 1.
 
         ``bursts_s`` are starts (after the flash's) and lengths where the drive is not on throughout. Their tails add

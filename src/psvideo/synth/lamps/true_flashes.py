@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.arrays import Doubles
+from psvideo.model.camera import Camera
 from psvideo.model.plan import FlashTrain, HasLights, Plan
 from psvideo.synth.lamps.emission import Bursts, Emission
 
@@ -38,19 +39,19 @@ class TrueClock:
     jitter_s: float = 0.0
     seed: int = 0
 
-    def camera_time_s(self, strobe_s: FloatArray) -> FloatArray:
+    def camera_time_s(self, strobe_s: Doubles) -> Doubles:
         """Return strobe seconds since the cycle's begin as times on the camera's clock, without jitter."""
         drift = 0.5e-6 * self.drift_ppm_per_s * strobe_s**2
         return self.phase_s + strobe_s * (1.0 + self.offset_ppm * 1e-6) + drift
 
-    def strobe_time_s(self, camera_s: FloatArray) -> FloatArray:
+    def strobe_time_s(self, camera_s: Doubles) -> Doubles:
         """Return times on the camera's clock as strobe seconds since the cycle's begin: ``camera_time_s`` reversed."""
         strobe_s = np.asarray(camera_s - self.phase_s, np.float64)
         for _ in range(NEWTON_STEPS):
             strobe_s = strobe_s - (self.camera_time_s(strobe_s) - camera_s) / self.rate(strobe_s)
         return strobe_s
 
-    def rate(self, strobe_s: FloatArray) -> FloatArray:
+    def rate(self, strobe_s: Doubles) -> Doubles:
         """Return how many camera seconds a strobe second lasts at the given strobe times."""
         return 1.0 + (self.offset_ppm + self.drift_ppm_per_s * strobe_s) * 1e-6
 
@@ -77,7 +78,7 @@ class TrueFlash(HasLights):
         return self.start_s + 0.5 * self.duration_s
 
 
-def row_opens_s(camera: Camera) -> FloatArray:
+def row_opens_s(camera: Camera) -> Doubles:
     """Return when each row of a frame opens after the frame's first row, shape (row,), never negative.
 
     Rows follow one another by readout / height: downwards from the top row, or upwards from the bottom row where the
@@ -120,7 +121,7 @@ def true_flashes(
     )
 
 
-def _free(plan: Plan, clock: TrueClock, end_s: float) -> tuple[FlashTrain, FloatArray, FloatArray]:
+def _free(plan: Plan, clock: TrueClock, end_s: float) -> tuple[FlashTrain, Doubles, Doubles]:
     """Let the strobe run freely from well before the clip to well after it."""
     per_cycle = len(plan.cycle_slots)
     ends_s = clock.strobe_time_s(np.array([0.0, end_s]))
@@ -130,7 +131,7 @@ def _free(plan: Plan, clock: TrueClock, end_s: float) -> tuple[FlashTrain, Float
     return train, clock.camera_time_s(train.start_s) + late_s, train.duration_s * clock.rate(train.start_s)
 
 
-def _synced(plan: Plan, frames: int) -> tuple[FlashTrain, FloatArray, FloatArray]:
+def _synced(plan: Plan, frames: int) -> tuple[FlashTrain, Doubles, Doubles]:
     """Trigger one flash per frame, in the middle of the time in which all of the frame's rows are open."""
     camera = plan.camera
     train = plan.train(0, frames)

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.synth.scene import AlbedoTable, ObjectTable
-from psvideo.synth.subject.material import PLAIN, Colours, colour, pattern_albedo, sample_texture
+from psvideo.synth.subject.material import PLAIN, colour, pattern_albedo, sample_texture
 from psvideo.synth.subject.meshes import builtin_names, builtin_shape
 from psvideo.synth.subject.shape import Shape, load_shape, load_texture
 
@@ -20,11 +20,11 @@ class Body:
 
     table: ObjectTable
     shape: Shape
-    rest_m: FloatArray
-    rest_normals: FloatArray
-    texture: Colours | None
+    rest_m: Doubles
+    rest_normals: Doubles
+    texture: Floats | None
 
-    def pose(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+    def pose(self, time_s: float) -> tuple[Doubles, Doubles]:
         """Return vertices (vertex, 3) in metres and normals (vertex, 3) at a time on the camera's clock."""
         turn = Rotation.from_euler("xyz", self.table.rotate_deg, degrees=True)
         shift = np.array(self.table.position_m)
@@ -37,7 +37,7 @@ class Body:
             shift = shift + np.array(motion.sway_m) * np.sin(2 * np.pi * motion.sway_hz * time_s)
         return turn.apply(self.rest_m) + shift, turn.apply(self.rest_normals)
 
-    def albedo(self, corners: np.ndarray, weights: FloatArray) -> Colours:
+    def albedo(self, corners: np.ndarray, weights: Doubles) -> Floats:
         """Return the albedo at points given as vertex triples (point, 3) and their weights (point, 3)."""
         table = self.table.albedo
         if not isinstance(table, AlbedoTable):
@@ -51,7 +51,7 @@ class Body:
         return np.full((len(corners), 3), PLAIN, np.float32)
 
 
-def _mix(values: FloatArray, corners: np.ndarray, weights: FloatArray) -> FloatArray:
+def _mix(values: Doubles, corners: np.ndarray, weights: Doubles) -> Doubles:
     return np.asarray(np.einsum("pcx,pc->px", values[corners], weights))
 
 
@@ -78,7 +78,7 @@ def make_body(table: ObjectTable, folder: Path) -> Body:
     )
 
 
-def _texture(mesh: str, shape: Shape, path: Path) -> Colours:
+def _texture(mesh: str, shape: Shape, path: Path) -> Floats:
     if shape.uv is None:
         raise PsvideoError(
             f"{path}: cannot be laid on the mesh {mesh!r}, which has no texture coordinates. Unwrap the mesh, or "

@@ -5,10 +5,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.synth.scene import AlbedoTable, Colour
 
-Colours = NDArray[np.float32]
 Keys = NDArray[np.uint64]
 
 PLAIN = 0.7
@@ -17,18 +16,18 @@ KEYS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np
 """What a step along each axis adds to the key of a lattice node, modulo 2^64."""
 
 
-def colour(value: Colour) -> Colours:
+def colour(value: Colour) -> Floats:
     """Return a scene file's colour, one number or three, as (3,)."""
     return np.broadcast_to(np.asarray(value, np.float32), (3,))
 
 
-def pattern_albedo(table: AlbedoTable, points_m: FloatArray) -> Colours:
+def pattern_albedo(table: AlbedoTable, points_m: Doubles) -> Floats:
     """Return the albedo at points of the object's own space, shape (point, 3)."""
     share = _share(table, points_m).astype(np.float32)[:, None]
     return colour(table.colour) + share * (colour(table.second) - colour(table.colour))
 
 
-def _share(table: AlbedoTable, points_m: FloatArray) -> FloatArray:
+def _share(table: AlbedoTable, points_m: Doubles) -> Doubles:
     """Return how much of the second colour each point has, 0 to 1."""
     along = points_m @ (np.asarray(table.axis, np.float64) / (np.linalg.norm(table.axis) or 1.0))
     cells = points_m / table.size_m
@@ -46,7 +45,7 @@ def _share(table: AlbedoTable, points_m: FloatArray) -> FloatArray:
     return np.zeros(len(points_m))
 
 
-def layered_noise(cells: FloatArray, octaves: int = 4) -> FloatArray:
+def layered_noise(cells: Doubles, octaves: int = 4) -> Doubles:
     """Return fractal value noise (point,) at points (point, 3) in units of its largest cells, about -1 to 1.
 
     It is the same on every machine.
@@ -57,7 +56,7 @@ def layered_noise(cells: FloatArray, octaves: int = 4) -> FloatArray:
     return total
 
 
-def _value_noise(points: FloatArray) -> FloatArray:
+def _value_noise(points: Doubles) -> Doubles:
     """Return smooth noise between random values at the integer lattice, -1 to 1."""
     along = np.ascontiguousarray(points.T)  # axis by axis: numpy is slow along a short last axis
     base = np.floor(along)
@@ -71,14 +70,14 @@ def _value_noise(points: FloatArray) -> FloatArray:
     return total
 
 
-def _lattice(mixed: Keys) -> FloatArray:
+def _lattice(mixed: Keys) -> Doubles:
     """Return a fixed random value for the key of each lattice node, -1 to 1 (the mixing steps of splitmix64)."""
     mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return np.asarray((mixed >> np.uint64(11)).astype(np.float64) * (2.0 / 2**53) - 1.0)
 
 
-def sample_texture(texture: Colours, uv: FloatArray) -> Colours:
+def sample_texture(texture: Floats, uv: Doubles) -> Floats:
     """Return the texture's colours at (u, v), bilinear and repeating; v runs upwards."""
     rows, cols = texture.shape[:2]
     x = uv[:, 0] * cols - 0.5

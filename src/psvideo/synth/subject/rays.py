@@ -5,7 +5,7 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 BOX = 100.0
 """Embree computes in 32 bits: the scene is scaled to this size, so that its rounding stays far below a pixel."""
@@ -14,7 +14,7 @@ BOX = 100.0
 class Caster:
     """Triangles that rays can be cast at. ``vertices`` (vertex, 3) in metres, ``faces`` (face, 3)."""
 
-    def __init__(self, vertices: FloatArray, faces: NDArray[np.int32]) -> None:
+    def __init__(self, vertices: Doubles, faces: NDArray[np.int32]) -> None:
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         self._origin = 0.5 * (low + high)
         self.size_m = float(np.linalg.norm(high - low)) or 1.0
@@ -22,22 +22,22 @@ class Caster:
         self._scene = rtcore_scene.EmbreeScene()
         TriangleMesh(scene=self._scene, vertices=self._boxed(vertices), indices=np.ascontiguousarray(faces, np.int32))
 
-    def first(self, origins: FloatArray, directions: FloatArray) -> NDArray[np.intp]:
+    def first(self, origins: Doubles, directions: Doubles) -> NDArray[np.intp]:
         """Return the face that each ray hits first, -1 where it hits none. Shapes (ray, 3) to (ray,)."""
         hit = self._scene.run(self._boxed(origins), np.ascontiguousarray(directions, np.float32), query="INTERSECT")
         return np.asarray(hit, np.intp)
 
-    def blocked(self, origins: FloatArray, directions: FloatArray, distance_m: FloatArray) -> NDArray[np.bool_]:
+    def blocked(self, origins: Doubles, directions: Doubles, distance_m: Doubles) -> NDArray[np.bool_]:
         """Return whether anything lies on each ray before ``distance_m``. Directions are unit vectors."""
         reach = np.minimum(distance_m * self._scale, 1e30).astype(np.float32)
         unit = np.ascontiguousarray(directions, np.float32)
         return np.asarray(self._scene.run(self._boxed(origins), unit, reach, query="OCCLUDED") >= 0)
 
-    def _boxed(self, points: FloatArray) -> NDArray[np.float32]:
+    def _boxed(self, points: Doubles) -> NDArray[np.float32]:
         return np.ascontiguousarray((points - self._origin) * self._scale, np.float32)
 
 
-def barycentric(origins: FloatArray, directions: FloatArray, corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+def barycentric(origins: Doubles, directions: Doubles, corners: Doubles) -> tuple[Doubles, Doubles]:
     """Return where rays meet the planes of their triangles: distance (ray,) and weights of the corners (ray, 3).
 
     ``corners`` has shape (ray, 3, 3). Computed in 64 bits, after Möller and Trumbore (1997).

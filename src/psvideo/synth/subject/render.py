@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.synth.scene import CameraTable
 from psvideo.synth.subject.body import Body
-from psvideo.synth.subject.material import Colours
 from psvideo.synth.subject.rays import Caster, barycentric
 
 
@@ -23,11 +22,11 @@ class Hits:
 
     size: tuple[int, int, int]
     sample: NDArray[np.intp]
-    point_m: FloatArray
-    normal: FloatArray
-    facet: FloatArray
-    to_camera: FloatArray
-    albedo: Colours
+    point_m: Doubles
+    normal: Doubles
+    facet: Doubles
+    to_camera: Doubles
+    albedo: Floats
     gloss: NDArray[np.float32]
 
     def image(self, values: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -47,7 +46,7 @@ class SeenScene:
     shadows: Caster | None
 
 
-def camera_rays(camera: CameraTable, far_m: float) -> tuple[FloatArray, FloatArray]:
+def camera_rays(camera: CameraTable, far_m: float) -> tuple[Doubles, Doubles]:
     """Return origins and unit directions of all rays, each (ray, 3); orthographic rays start at z = ``far_m``."""
     rows, cols, rays = camera.height_px, camera.width_px, camera.rays
     offsets = (np.arange(rays) + 0.5) / rays - 0.5
@@ -98,12 +97,12 @@ def cast_rays(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> See
     return SeenScene(hits=hits, shadows=_shadow_caster(bodies, vertices, faces, owner, caster))
 
 
-def unit_vectors(vectors: FloatArray) -> FloatArray:
+def unit_vectors(vectors: Doubles) -> Doubles:
     """Return vectors (point, 3) of length 1 that point the same way; those without a length stay zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
 
 
-def _albedo(bodies: Sequence[Body], owner: NDArray[np.intp], corners: NDArray[np.intp], weights: FloatArray) -> Colours:
+def _albedo(bodies: Sequence[Body], owner: NDArray[np.intp], corners: NDArray[np.intp], weights: Doubles) -> Floats:
     albedo = np.zeros((len(owner), 3), np.float32)
     for index, body in enumerate(bodies):
         own = owner == index
@@ -118,7 +117,7 @@ def _gloss(body: Body) -> tuple[float, float]:
 
 
 def _shadow_caster(
-    bodies: Sequence[Body], vertices: FloatArray, faces: NDArray[np.integer], owner: NDArray[np.intp], caster: Caster
+    bodies: Sequence[Body], vertices: Doubles, faces: NDArray[np.integer], owner: NDArray[np.intp], caster: Caster
 ) -> Caster | None:
     casts = np.array([body.table.casts_shadow for body in bodies])
     if casts.all():

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.model.rig import Light, Rig
 from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.scene import AmbientTable
-from psvideo.synth.subject.material import Colours, colour
+from psvideo.synth.subject.material import colour
 from psvideo.synth.subject.render import Hits, SeenScene, unit_vectors
 
 LIFT = 1e-5
@@ -34,7 +34,7 @@ def flash_plate(
     return view.hits.image(collected)
 
 
-def light_collected(view: SeenScene, light: Light) -> Colours:
+def light_collected(view: SeenScene, light: Light) -> Floats:
     """Return each hit's light under one lamp at full power and its reference duration, (hit, 3)."""
     hits = view.hits
     direction, distance_m, strength = irradiance(light, hits.point_m)
@@ -44,7 +44,7 @@ def light_collected(view: SeenScene, light: Light) -> Colours:
     return np.asarray(reflected * strength * cosine.astype(np.float32)[:, None], np.float32)
 
 
-def irradiance(light: Light, points_m: FloatArray) -> tuple[FloatArray, FloatArray, Colours]:
+def irradiance(light: Light, points_m: Doubles) -> tuple[Doubles, Doubles, Floats]:
     """Return per point the unit direction to the light, the distance in metres (inf where distant), the irradiance."""
     strength = np.broadcast_to(np.asarray(light.by_channel, np.float32), (3,))
     if light.direction is not None:
@@ -59,9 +59,7 @@ def irradiance(light: Light, points_m: FloatArray) -> tuple[FloatArray, FloatArr
     return direction, distance_m, strength * falloff.astype(np.float32)[:, None]
 
 
-def _shadowed(
-    view: SeenScene, direction: FloatArray, distance_m: FloatArray, lit: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _shadowed(view: SeenScene, direction: Doubles, distance_m: Doubles, lit: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return for each hit whether something stands between it and the light; only asked where the light could reach."""
     shadowed = np.zeros(len(lit), bool)
     if view.shadows is not None and lit.any():
@@ -70,13 +68,13 @@ def _shadowed(
     return shadowed
 
 
-def lifted(view: SeenScene) -> FloatArray:
+def lifted(view: SeenScene) -> Doubles:
     """Return the hits' points (hit, 3) a little above their surface, where rays towards lights start."""
     size_m = view.shadows.size_m if view.shadows is not None else 0.0
     return np.asarray(view.hits.point_m + LIFT * size_m * view.hits.facet)
 
 
-def _highlight(hits: Hits, direction: FloatArray) -> NDArray[np.float32]:
+def _highlight(hits: Hits, direction: Doubles) -> NDArray[np.float32]:
     """Return the normalised Blinn-Phong lobe, in units of albedo: strength * (exponent + 8) / 8 * (n . h)^exponent."""
     strength, exponent = hits.gloss[:, 0], hits.gloss[:, 1]
     if not strength.any():
@@ -95,7 +93,7 @@ def ambient_plate(view: SeenScene, table: AmbientTable) -> NDArray[np.float32]:
     return hits.image(hits.albedo * colour(table.level) * open_share.astype(np.float32)[:, None])
 
 
-def _openness(view: SeenScene, rays: int) -> FloatArray:
+def _openness(view: SeenScene, rays: int) -> Doubles:
     """Return the cosine-weighted share of the sky that each hit sees, from a fixed spiral of directions."""
     hits = view.hits
     if rays == 0 or view.shadows is None:

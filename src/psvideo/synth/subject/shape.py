@@ -10,7 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.synth.camera.curves import CURVES
 
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
@@ -27,15 +27,15 @@ class Shape:
     texture (row, col, 3) linear. Edges are hard where vertices are doubled.
     """
 
-    vertices: FloatArray
+    vertices: Doubles
     faces: NDArray[np.int32]
-    normals: FloatArray
+    normals: Doubles
     colours: NDArray[np.float32] | None = None
-    uv: FloatArray | None = None
+    uv: Doubles | None = None
     texture: NDArray[np.float32] | None = None
 
 
-def make_shape(vertices: FloatArray, faces: NDArray[np.integer], colours: FloatArray | None = None) -> Shape:
+def make_shape(vertices: Doubles, faces: NDArray[np.integer], colours: Doubles | None = None) -> Shape:
     """Return a shape of vertices (vertex, 3), faces (face, 3) and colours (vertex, 3).
 
     Its normals are the area-weighted means of the faces around each vertex.
@@ -62,7 +62,7 @@ def merged(*shapes: Shape) -> Shape:
     )
 
 
-def vertex_normals(vertices: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
+def vertex_normals(vertices: Doubles, faces: NDArray[np.integer]) -> Doubles:
     """Return unit normals (vertex, 3): the sum of the adjoining faces' normals, each weighted by its area."""
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     crosses = np.cross(b - a, c - a)
@@ -97,7 +97,7 @@ def load_shape(path: Path) -> Shape:
     )
 
 
-def _seamless_normals(vertices: FloatArray, faces: NDArray[np.int32]) -> FloatArray:
+def _seamless_normals(vertices: Doubles, faces: NDArray[np.int32]) -> Doubles:
     """Return vertex normals that take vertices in one place for one: texture seams double them without an edge."""
     places, at = np.unique(vertices, axis=0, return_inverse=True)
     return vertex_normals(places, at.reshape(-1)[faces])[at.reshape(-1)]
@@ -105,7 +105,7 @@ def _seamless_normals(vertices: FloatArray, faces: NDArray[np.int32]) -> FloatAr
 
 def _own_colours(
     mesh: trimesh.Trimesh,
-) -> tuple[NDArray[np.float32] | None, FloatArray | None, NDArray[np.float32] | None]:
+) -> tuple[NDArray[np.float32] | None, Doubles | None, NDArray[np.float32] | None]:
     visual = mesh.visual
     if isinstance(visual, trimesh.visual.ColorVisuals) and visual.kind == "vertex":
         return linear_from_srgb(np.asarray(visual.vertex_colors, np.uint8)[:, :3]), None, None

@@ -17,7 +17,7 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from psvideo.errors import PsvideoError
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 UNEVEN = 0.25
 LEAST_EVEN_SHARE = 0.5
@@ -140,7 +140,7 @@ class _EvenRate(NamedTuple):
     rate_error: float
 
 
-def _even_rate(timestamps: FloatArray, places: FloatArray) -> _EvenRate:
+def _even_rate(timestamps: Doubles, places: Doubles) -> _EvenRate:
     """Return the even rate that timestamps keep: by the first and the last where they are only rounded, else by all."""
     span = float(timestamps[-1] - timestamps[0])
     period = span / float(places[-1])

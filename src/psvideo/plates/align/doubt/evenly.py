@@ -8,16 +8,16 @@ pixel's own side (Kuwahara, Hachimura, Eiho and Kinoshita, "Processing of RI-ang
 import cv2
 import numpy as np
 
+from psvideo.model.arrays import Floats
 from psvideo.plates.align.doubt.evenly_kernel import evenest_rows
-from psvideo.plates.align.velocity.flow import Vectors
 
 EACH_PX = 7
 """Of such windows nine hold a pixel: in their middle, at their corners, or at their sides."""
 
 
 def evenly_changed(
-    apart: Vectors, usual: tuple[Vectors, Vectors], each: tuple[int, int], even: float
-) -> tuple[Vectors, Vectors]:
+    apart: Floats, usual: tuple[Floats, Floats], each: tuple[int, int], even: float
+) -> tuple[Floats, Floats]:
     """Return by how much plates differ around every pixel, (row, col), and the mean square of what is left there.
 
     ``apart`` is by how much they differ, ``usual`` what holds where nothing around is even: where more than ``even`` is

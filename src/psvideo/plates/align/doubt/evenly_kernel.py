@@ -1,12 +1,8 @@
 """The compiled loop that finds, of the windows that hold a pixel, the one that changed most evenly."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
-
-Floats = NDArray[np.float32]
+from psvideo.model.arrays import Floats
 
 
 @FUSED.kept

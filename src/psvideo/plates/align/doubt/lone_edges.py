@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.brightness import SCALE, light_of
-from psvideo.plates.align.velocity.flow import TOE, Codes, Flags, Sketch, Vectors
+from psvideo.plates.align.velocity.flow import TOE, Sketch
 
 SMOOTH_PX, BESIDE_PX = 1.0, 3
 """Edges are looked for in sketches smoothed by the first, and found again over a window of the second."""
@@ -46,7 +47,7 @@ class InstantSketch:
     and the ``noise`` of what changes between two of them, in codes. ``used`` (row, col) is where the light's plate is
     used, None where it is everywhere: nobody sees its edges elsewhere."""
 
-    codes: Codes
+    codes: Codes8
     white: float
     noise: float
     used: Flags | None = None
@@ -58,7 +59,7 @@ class InstantSketch:
         return cls(codes=np.asarray(codes, np.uint8), white=sketch.white, noise=0.0)
 
 
-def unsure_by_lone_edges(shown: Sequence[InstantSketch], moves: Flags) -> list[Vectors]:
+def unsure_by_lone_edges(shown: Sequence[InstantSketch], moves: Flags) -> list[Floats]:
     """Return by how much every light's plate may be off because lights do not show the same edges, each (row, col), in
     units of its light. ``moves`` says where a motion was found that all lights agree with."""
     if len(shown) < FEWEST:
@@ -71,7 +72,7 @@ def unsure_by_lone_edges(shown: Sequence[InstantSketch], moves: Flags) -> list[V
     return [share * light_of(one.codes.astype(np.float32)) * np.float32(one.white) for one in shown]
 
 
-def _lone(shown: Sequence[InstantSketch], noise: float) -> Vectors:
+def _lone(shown: Sequence[InstantSketch], noise: float) -> Floats:
     """Return how much of an edge is alone, (row, col), as a step in the logarithm of light."""
     edges = [_edges(one, noise) for one in shown]
     lit = np.sum([here for _, _, here in edges], axis=0, dtype=np.int16) >= FEWEST
@@ -87,7 +88,7 @@ def _lone(shown: Sequence[InstantSketch], noise: float) -> Vectors:
     return np.asarray(alone * lit, np.float32)
 
 
-def _edges(one: InstantSketch, noise: float) -> tuple[Vectors, Vectors, Vectors]:
+def _edges(one: InstantSketch, noise: float) -> tuple[Floats, Floats, Floats]:
     """Return steps in the logarithm of light over three pixels, the least that is one and no shading, and 1 where light
     is enough."""
     light = cv2.GaussianBlur(light_of(one.codes.astype(np.float32)), (0, 0), SMOOTH_PX)

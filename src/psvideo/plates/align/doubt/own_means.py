@@ -2,14 +2,13 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Planes = NDArray[np.float32]
-Flags = NDArray[np.bool_]
+from psvideo.model.arrays import Flags, Floats
+
 LEAST = np.float32(1e-6)
 
 
-def own_mean(values: Planes, window: tuple[int, int], moves: Flags) -> Planes:
+def own_mean(values: Floats, window: tuple[int, int], moves: Flags) -> Floats:
     """Return the mean of values (row, col) over a window, of pixels that move where a pixel does, and else of those
     that stand still."""
     if moves.all() or not moves.any():

@@ -6,9 +6,9 @@ is not the true one; the plate at the instant then lies somewhere between them, 
 
 import numpy as np
 
+from psvideo.model.arrays import Codes8, Floats
 from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.plates.align.velocity.brightness import ROOT_TOE, SCALE
-from psvideo.plates.align.velocity.flow import Codes, Vectors
 from psvideo.plates.align.velocity.followed import Followed, Pair, odd_width
 
 WINDOW_PX = 3
@@ -19,7 +19,7 @@ NOISE_FACTOR = 1.6
 """Squares of a change below this many times those that noise makes of it are noise."""
 
 
-def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed, noise: float) -> Vectors:
+def unsure_of(pair: Pair, before: Codes8, after: Codes8, motion: Followed, noise: float) -> Floats:
     """Return the standard error of a light's plate at an instant, (row, col) of the velocities, in units of its light.
 
     ``before`` and ``after`` are the codes of its sketches, moved to the instant, and ``noise`` is that of their change.

@@ -12,16 +12,9 @@ import cv2
 import numpy as np
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.correlation import displacements
-from psvideo.plates.align.velocity.flow import (
-    FINE_PIXELS,
-    Codes,
-    Flags,
-    Vectors,
-    comparable,
-    flow_from,
-    pixel_places,
-)
+from psvideo.plates.align.velocity.flow import FINE_PIXELS, comparable, flow_from, pixel_places
 from psvideo.plates.align.velocity.followed import Pair, mean_over, odd_width
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
@@ -47,10 +40,10 @@ BAND_PIXELS = 1 << 16
 class AllLights:
     """The lights' codes as flow sees them (before, after), their detail (light, row, col), and the times to them."""
 
-    codes: tuple[tuple[Codes, Codes], ...]
-    befores: Codes
-    afters: Codes
-    spans_s: Vectors
+    codes: tuple[tuple[Codes8, Codes8], ...]
+    befores: Codes8
+    afters: Codes8
+    spans_s: Floats
 
     @classmethod
     def of(cls, pairs: Sequence[Pair], time_s: float) -> "AllLights":
@@ -81,11 +74,11 @@ class AllLights:
         rows, cols = self.befores.shape[1:]
         return rows // self.step, cols // self.step
 
-    def mean(self, values: Vectors, window_px: int) -> Vectors:
+    def mean(self, values: Floats, window_px: int) -> Floats:
         """Return means over windows of this many pixels of the sketches."""
         return mean_over(values, odd_width(window_px, self.step))
 
-    def unlike(self, velocity: Vectors) -> Vectors:
+    def unlike(self, velocity: Floats) -> Floats:
         """Return how unlike all lights' plates are along velocities, shape (row, col), 0 to the number of lights."""
         out = np.empty(self.shape, np.float32)
 
@@ -95,7 +88,7 @@ class AllLights:
         over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
         return out
 
-    def stays(self, velocity: Vectors) -> Flags:
+    def stays(self, velocity: Floats) -> Flags:
         """Return what is within the picture at both ends of its way: the rest is hidden in one plate of every light."""
         before_s, after_s = (np.float32(span_s) for span_s in self.spans_s.mean(axis=0))
         within = np.ones(self.shape, np.bool_)
@@ -113,7 +106,7 @@ class AllLights:
             count += still[: self.step * len(count) : self.step, : self.step * count.shape[1] : self.step]
         return np.asarray(count < max(STILL_LIGHTS, STILL_SHARE * self.count))
 
-    def proposed(self) -> list[Vectors]:
+    def proposed(self) -> list[Floats]:
         """Return the velocities that flow proposes: both ways of few lights, one way of each of more."""
         chosen = _spread(self.count, MOST_FLOWS)
         ways = [(light, bool(n % 2)) for n, light in enumerate(chosen)]
@@ -121,7 +114,7 @@ class AllLights:
             ways = [(light, back) for light in chosen for back in (False, True)]
         return self._flows([(light, back, None) for light, back in ways])
 
-    def proposed_far(self) -> list[Vectors]:
+    def proposed_far(self) -> list[Floats]:
         """Return velocities of what moved farther than flow reaches by itself."""
         pairs = (tuple(map(_smoothed, pair)) for pair in self.codes)
         found = displacements(pairs, self.codes[0][0].shape, FAR)
@@ -131,8 +124,8 @@ class AllLights:
             plane[0], plane[1] = np.array([x, y]) / self.step / self.spans_s.sum(axis=1).mean()
         return constant + self._flows([(light, bool(n % 2), place) for place in found for n, light in enumerate(some)])
 
-    def _flows(self, ways: list[tuple[int, bool, tuple[float, float] | None]]) -> list[Vectors]:
-        def run(first: int, _: int) -> Vectors:
+    def _flows(self, ways: list[tuple[int, bool, tuple[float, float] | None]]) -> list[Floats]:
+        def run(first: int, _: int) -> Floats:
             light, back, start_px = ways[first]
             since_s, until_s = (float(span) for span in self.spans_s[light])
             one, other = self.codes[light]
@@ -152,11 +145,11 @@ def _spread(count: int, most: int) -> list[int]:
     return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
 
 
-def _smoothed(codes: Codes) -> Vectors:
+def _smoothed(codes: Codes8) -> Floats:
     return np.asarray(cv2.GaussianBlur(codes.astype(np.float32), (0, 0), FINEST_PX), np.float32)
 
 
-def _detail(codes: Codes) -> Codes:
+def _detail(codes: Codes8) -> Codes8:
     smooth = _smoothed(codes)
     shading = mean_over(smooth, SHADING_PX)
     detail = smooth - shading

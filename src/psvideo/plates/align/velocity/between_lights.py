@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Codes8, Floats
 from psvideo.plates.align.velocity.brightness import light_of
-from psvideo.plates.align.velocity.flow import TOE, Codes, Vectors
+from psvideo.plates.align.velocity.flow import TOE
 from psvideo.plates.align.velocity.moving_kernel import moved_rows
 
 SMOOTH_PX, SHADING_PX, EVEN_PX = 1.0, 13, 21
@@ -35,12 +36,12 @@ class BetweenLights:
     seconds from each of them to the instant, (light,), below 0 where it is later, and how many velocities there are,
     (row, col)."""
 
-    details: Codes
-    since_s: Vectors
+    details: Codes8
+    since_s: Floats
     shape: tuple[int, int]
 
     @classmethod
-    def of(cls, codes: Sequence[tuple[Codes, Codes]], spans_s: Vectors, shape: tuple[int, int]) -> "BetweenLights":
+    def of(cls, codes: Sequence[tuple[Codes8, Codes8]], spans_s: Floats, shape: tuple[int, int]) -> "BetweenLights":
         """``codes`` are those of the plates before and after, and ``spans_s`` (light, 2) the times since and until."""
         first = np.abs(spans_s[:, 0]) <= np.abs(spans_s[:, 1])
         since_s = np.where(first, spans_s[:, 0], -spans_s[:, 1])
@@ -54,7 +55,7 @@ class BetweenLights:
         over_ranges(sharpen, len(codes), each=1)
         return cls(details=details, since_s=since_s[order], shape=shape)
 
-    def disagree(self, velocity: Vectors, window_px: int) -> Vectors:
+    def disagree(self, velocity: Floats, window_px: int) -> Floats:
         """Return how little lights that follow each other agree along a velocity over windows of pixels of the
         sketches, (row, col): one minus their correlation, 0 to 2, in the mean."""
         stride = STRIDE * self.details.shape[1] // self.shape[0]
@@ -70,7 +71,7 @@ class BetweenLights:
         total /= max(len(self.details) - 1, 1)
         return np.asarray(cv2.resize(total, self.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
-    def _moved(self, place: int, velocity: Vectors) -> Vectors:
+    def _moved(self, place: int, velocity: Floats) -> Floats:
         out = np.empty([-(-length // STRIDE) for length in self.shape], np.float32)
 
         def run(first: int, last: int) -> None:
@@ -81,7 +82,7 @@ class BetweenLights:
         return out
 
 
-def _detail(codes: Codes) -> Codes:
+def _detail(codes: Codes8) -> Codes8:
     """Return edges of paint and shape, whatever the light on them, in codes."""
     smooth = np.asarray(cv2.GaussianBlur(codes.astype(np.float32), (0, 0), SMOOTH_PX), np.float32)
     level = np.log(light_of(smooth) + np.float32(2 * TOE))

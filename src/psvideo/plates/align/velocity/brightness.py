@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
-from psvideo.plates.align.velocity.flow import TOE, Sketch, Vectors
+from psvideo.model.arrays import Floats
+from psvideo.plates.align.velocity.flow import TOE, Sketch
 
 LIT, NEAR_WHITE = 32, 250
 """Codes between which brightness is compared: below is mostly black, above may be cut off at a sketch's white."""
@@ -56,12 +57,12 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     return replace(after, codes=codes, blocks=np.asarray(blocks, np.float32))
 
 
-def light_of(codes: NDArray[np.float32]) -> Vectors:
+def light_of(codes: NDArray[np.float32]) -> Floats:
     """Return the light that a sketch's codes stand for, 1 = white."""
     return np.asarray(np.square(codes / np.float32(SCALE) + np.float32(ROOT_TOE)) - np.float32(TOE), np.float32)
 
 
-def _brightened(codes: NDArray[np.float32], gain: float) -> Vectors:
+def _brightened(codes: NDArray[np.float32], gain: float) -> Floats:
     """Return the codes of this many times the light."""
     light = np.clip(np.float32(gain) * light_of(codes), 0, 1)
     return np.asarray((np.sqrt(light + np.float32(TOE)) - np.float32(ROOT_TOE)) * np.float32(SCALE), np.float32)

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import cv2
 import numpy as np
 
-from psvideo.plates.align.velocity.flow import Vectors
+from psvideo.model.arrays import Floats
 
 LARGEST_PX = 240
 """Pictures are made smaller until neither side is longer: a pixel more or less is left to flow."""
@@ -20,9 +20,7 @@ AROUND_PX = 3
 """What is so near to one displacement, or to none, is no other."""
 
 
-def displacements(
-    pairs: Iterable[tuple[Vectors, ...]], shape: tuple[int, ...], count: int
-) -> list[tuple[float, float]]:
+def displacements(pairs: Iterable[tuple[Floats, ...]], shape: tuple[int, ...], count: int) -> list[tuple[float, float]]:
     """Return the likeliest displacements (x right, y down, in pixels) from the first pictures to the second ones, all
     of a ``shape``; no pair is held when the next one is asked for."""
     from scipy import fft  # scipy takes 15 MB, which runs do without where nothing moves
@@ -49,6 +47,6 @@ def displacements(
     return places
 
 
-def _forget(total: Vectors, row: int, col: int) -> None:
+def _forget(total: Floats, row: int, col: int) -> None:
     near = np.arange(-AROUND_PX, AROUND_PX + 1)
     total[np.ix_((row + near) % total.shape[0], (col + near) % total.shape[1])] = -np.inf

@@ -13,14 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
-from psvideo.model.coded import Image
+from psvideo.model.arrays import Bytes, Codes8, Flags, Floats, Image
 from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.several_lights.clipped_flashes import Filled, coarser, filled_of, vague_between
-
-Codes = NDArray[np.uint8]
-Vectors = NDArray[np.float32]
-Flags = NDArray[np.bool_]
+from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
 
 LARGEST_PX = 1_200_000
 """Pictures of more pixels are halved before flow is looked for."""
@@ -57,11 +53,11 @@ class Sketch:
 
     number: int
     time_s: float
-    codes: Codes
+    codes: Codes8
     seen: Flags
-    blocks: Vectors
+    blocks: Floats
     white: float
-    filled: Filled | None = None
+    filled: Bytes | None = None
 
 
 def white_of(plate: LightPlate) -> float:
@@ -77,8 +73,8 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     seen = plate.seen if plate.seen.ndim == 2 else plate.seen[:, None]
     if halved:
         seen = all_of(seen, 2)
-    shown: Vectors = np.empty(grey.shape[:2], np.float32)
-    codes: Codes = np.empty(grey.shape[:2], np.uint8)
+    shown: Floats = np.empty(grey.shape[:2], np.float32)
+    codes: Codes8 = np.empty(grey.shape[:2], np.uint8)
     root = float(np.sqrt(TOE))
     scale = np.float32(255 / (np.sqrt(1 + TOE) - root))
     light = np.ascontiguousarray(grey)
@@ -109,7 +105,7 @@ def _grey(image: Image) -> Image:
     return np.asarray(cv2.transform(image, np.full((1, image.shape[2]), 1 / image.shape[2], np.float32)), np.float32)
 
 
-def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
+def comparable(before: Sketch, after: Sketch) -> tuple[Codes8, Codes8]:
     """Return the codes of both; what no frame saw for one of them shows the same in both, and so does not seem to move,
     nor does what is filled."""
     one, other = before.codes, after.codes
@@ -160,7 +156,7 @@ def _spread(change: NDArray[Any], shown: NDArray[Any], step: int = 1) -> float:
     return float(quarter) / QUARTER_OF_NORMAL / float(np.sqrt(6))
 
 
-def flow_from(one: Codes, other: Codes, start_px: tuple[float, float] | None = None) -> Vectors:
+def flow_from(one: Codes8, other: Codes8, start_px: tuple[float, float] | None = None) -> Floats:
     """Return the way from every pixel of one picture to the other, (row, col, 2) as (x right, y down), px.
 
     ``start_px`` is where it is looked for; left out, nearby.
@@ -179,7 +175,7 @@ def flow_from(one: Codes, other: Codes, start_px: tuple[float, float] | None = N
     return np.asarray(search.calc(one, other, start), np.float32)
 
 
-def pixel_places(rows: int, cols: int) -> tuple[Vectors, Vectors]:
+def pixel_places(rows: int, cols: int) -> tuple[Floats, Floats]:
     """Return the column and the row of every pixel, each (row, col)."""
     x, y = np.meshgrid(np.arange(cols, dtype=np.float32), np.arange(rows, dtype=np.float32))
     return x, y

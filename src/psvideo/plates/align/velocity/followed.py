@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from psvideo.plates.align.velocity.flow import Flags, Sketch, Vectors
+from psvideo.model.arrays import Flags, Floats
+from psvideo.plates.align.velocity.flow import Sketch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,13 +25,13 @@ class Followed:
     ``step`` of the sketches'."""
 
     time_s: float
-    velocity: Vectors
+    velocity: Floats
     moves: Flags
     rests: Flags
     step: int = 1
 
     @functools.cached_property
-    def nearby(self) -> Vectors:
+    def nearby(self) -> Floats:
         """The velocity of what moves nearest to every pixel, (2, row, col)."""
         if not self.moves.any():
             return self.velocity
@@ -44,7 +45,7 @@ class Followed:
         """Return the same with nothing that moves where ``still`` (row, col)."""
         return replace(self, velocity=self.velocity * ~still, moves=self.moves & ~still)
 
-    def way(self, span_s: float) -> Vectors:
+    def way(self, span_s: float) -> Floats:
         """Return how far every pixel goes in a time, shape (2, row, col)."""
         return np.float32(span_s) * self.velocity
 
@@ -55,6 +56,6 @@ def odd_width(window_px: int, step: int) -> int:
     return max(window_px // step | 1, min(window_px, 3))
 
 
-def mean_over(values: Vectors, window_px: int) -> Vectors:
+def mean_over(values: Floats, window_px: int) -> Floats:
     """Return means over windows of this many of the values' own pixels."""
     return np.asarray(cv2.blur(values, (window_px, window_px)), np.float32)

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.velocity.all_lights import AllLights
 from psvideo.plates.align.velocity.between_lights import BetweenLights
-from psvideo.plates.align.velocity.flow import Flags, Vectors, pixel_places
+from psvideo.plates.align.velocity.flow import pixel_places
 from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, odd_width
 
 WINDOW_PX, FINE_PX = 9, 3
@@ -62,7 +63,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     return Followed(time_s=time_s, velocity=velocity, moves=moves, rests=rests & ~moves, step=lights.step)
 
 
-def _best(lights: AllLights, wide_rest: Vectors) -> tuple[Vectors, Vectors]:
+def _best(lights: AllLights, wide_rest: Floats) -> tuple[Floats, Floats]:
     """Return, of all proposed velocities, the one for every pixel along which plates are the most alike, and how unlike
     they are. Far ones are proposed where much of the picture is puzzling."""
     velocity, best = np.zeros((2, *lights.shape), np.float32), np.full(lights.shape, np.inf, np.float32)
@@ -75,25 +76,25 @@ def _best(lights: AllLights, wide_rest: Vectors) -> tuple[Vectors, Vectors]:
     return velocity, best
 
 
-def _take_better(lights: AllLights, proposed: Vectors, velocity: Vectors, best: Vectors) -> None:
+def _take_better(lights: AllLights, proposed: Floats, velocity: Floats, best: Floats) -> None:
     unlike = lights.mean(lights.unlike(proposed), WINDOW_PX)
     better = unlike < best
     np.copyto(best, unlike, where=better)
     np.copyto(velocity, proposed, where=better)
 
 
-def _refuted(rested: Vectors, moved: Vectors) -> Flags:
+def _refuted(rested: Floats, moved: Floats) -> Flags:
     """Return where lights agree at rest, and not along a motion."""
     return np.asarray((rested < np.float32(AGREED)) & (moved > rested + np.float32(WORSE)))
 
 
-def _clearly(unlike: Vectors, other: Vectors, count: int) -> Flags:
+def _clearly(unlike: Floats, other: Floats, count: int) -> Flags:
     """Return where one motion explains clearly more than another."""
     return np.asarray(unlike < np.maximum(EXPLAINED * other - MARGIN * count, other - GAIN * count))
 
 
 def _grown(
-    lights: AllLights, moves: Flags, velocity: Vectors, rest: tuple[Vectors, Vectors], stirs: Flags
+    lights: AllLights, moves: Flags, velocity: Floats, rest: tuple[Floats, Floats], stirs: Flags
 ) -> tuple[Flags, Flags]:
     """Return ``moves`` with those beside it that move along as well as they rest, and what beside it clearly rests; put
     the ``velocity`` of the former in: what is bare shows no motion of its own, and follows the most of what is around.
@@ -117,7 +118,7 @@ def _grown(
     return moves | joins, rests
 
 
-def _shifted(values: Vectors, way: Vectors) -> Vectors:
+def _shifted(values: Floats, way: Floats) -> Floats:
     x, y = pixel_places(*values.shape)
     x, y = x + way[0], y + way[1]
     return np.asarray(cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)

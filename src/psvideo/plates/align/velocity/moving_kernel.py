@@ -1,13 +1,11 @@
 """Compiled parts of following motion: how unlike plates are along velocities, where flow leads, what moves there."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
+from psvideo.model.arrays import Codes8, Floats
 
-Codes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 AT_REST, BEFORE, AFTER, BOTH, NOWHERE = range(5)
 """What a pixel is taken from: the nearer plate as it is, one plate moved along the motion, both, or none."""
 ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)
@@ -18,7 +16,7 @@ STEPS = 4
 
 
 @FUSED.inlined
-def _between(picture: Codes, row: np.float32, col: np.float32) -> np.float32:
+def _between(picture: Codes8, row: np.float32, col: np.float32) -> np.float32:
     """A code between pixels; beyond the border it is the border's."""
     row = min(max(row, ZERO), np.float32(picture.shape[0] - 1))
     col = min(max(col, ZERO), np.float32(picture.shape[1] - 1))
@@ -40,7 +38,7 @@ def _steps(shape: tuple[int, int], coarse: tuple[int, int]) -> tuple[np.float32,
 
 @FUSED.kept
 def unlike_rows(
-    befores: Codes, afters: Codes, spans_s: Floats, velocity: Floats, first: int, last: int, out: Floats
+    befores: Codes8, afters: Codes8, spans_s: Floats, velocity: Floats, first: int, last: int, out: Floats
 ) -> None:
     """Fill rows of ``out`` (row, col): how unlike the lights' plates before and after are at the ends of the way.
 
@@ -68,7 +66,7 @@ def unlike_rows(
 
 @FUSED.kept
 def moved_rows(
-    picture: Codes, since_s: np.float32, velocity: Floats, stride: int, first: int, last: int, out: Floats
+    picture: Codes8, since_s: np.float32, velocity: Floats, stride: int, first: int, last: int, out: Floats
 ) -> None:
     """Fill rows of ``out`` (row, col) with what a picture of so many seconds ago, below 0 of so many ahead, shows along
     velocities, (2, row, col) in their own pixels per second; ``out`` takes every ``stride``-th of them. The picture has

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go
-from psvideo.plates.align.velocity.flow import Flags, Vectors
+from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.velocity.followed import Followed, odd_width
 
 GAPS_PX = 9
@@ -22,14 +22,14 @@ SMOOTH_PX = 27
 """Vectors of plain parts are means over such a window, as where alignment lets them grow."""
 
 
-def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Vectors:
+def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Floats:
     """Return the velocity of every pixel of a picture (row, col[, channel]), x right and y down, (row, col, 2)."""
     planes = np.empty((2, *shape[:2]), np.float32)
     fill_per_s(motion, planes)
     return np.moveaxis(planes, 0, -1)
 
 
-def fill_per_s(motion: Followed | None, planes: Vectors) -> None:
+def fill_per_s(motion: Followed | None, planes: Floats) -> None:
     """Fill ``planes`` (2, row, col) with the velocity of every pixel of a picture of that shape, x right and y down."""
     rows, cols = planes.shape[1:]
     if motion is None:
@@ -43,7 +43,7 @@ def fill_per_s(motion: Followed | None, planes: Vectors) -> None:
         let_go(plane)
 
 
-def _of_whole_things(motion: Followed) -> Vectors:
+def _of_whole_things(motion: Followed) -> Floats:
     """Return the velocity, (2, row, col), also of what lies undecided within what moves."""
     inside = _enclosed(motion)
     if not inside.any():

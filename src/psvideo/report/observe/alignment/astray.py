@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.plates.light_plate import LightPlate
 from psvideo.report.observe.alignment.part_places import PartPlaces, places_of_parts
 from psvideo.report.observe.alignment.similarity import Similarities, similarities
@@ -131,11 +131,11 @@ def _said(fitted: Similarities, parts: Sequence[PartPlaces], lights: Sequence[st
     )
 
 
-def _typical(each: FloatArray) -> float:
+def _typical(each: Doubles) -> float:
     return float(np.sqrt((each**2).mean()))
 
 
-def _surely(off_px: FloatArray, error_px: FloatArray) -> bool:
+def _surely(off_px: Doubles, error_px: Doubles) -> bool:
     """Return whether pictures, or one of them, are farther off than parts differ by."""
     one = bool(((off_px > ONE_SHOWN_PX) & (off_px > ONE_SURELY * error_px)).any())
     return one or _typical(off_px) > max(LEAST_SHOWN_PX, SURELY * _typical(error_px))

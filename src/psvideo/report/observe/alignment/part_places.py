@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.plates.light_plate import LightPlate
 from psvideo.report.observe.rig_and_curve.rigpoints import CHANNEL, RigPoints
 
@@ -44,14 +44,14 @@ class PartPlaces:
     make of it.
     """
 
-    middle: FloatArray
-    found: FloatArray
-    square: FloatArray
-    right: FloatArray
+    middle: Doubles
+    found: Doubles
+    square: Doubles
+    right: Doubles
     left: float
-    agreement: FloatArray
+    agreement: Doubles
 
-    def explained(self, places: FloatArray) -> float:
+    def explained(self, places: Doubles) -> float:
         """Return the share of ``left`` that pictures at some ``places`` (light, 2) would explain."""
         flat = places.T.ravel()
         return float(flat @ (2 * self.right - self.square @ flat)) / max(self.left, 1e-30)
@@ -80,7 +80,7 @@ def _parts(box: tuple[slice, slice], *, side_px: int) -> Iterator[tuple[slice, s
     yield from (part for part in parts if all(side.start < side.stop for side in part))
 
 
-def _vectors_at(points: RigPoints, part: tuple[slice, slice]) -> FloatArray:
+def _vectors_at(points: RigPoints, part: tuple[slice, slice]) -> Doubles:
     """Return what the rig sends to the middle of a part, (light, 3)."""
     if len(points.vectors) == 1:
         return np.asarray(points.vectors[0], np.float64)
@@ -90,7 +90,7 @@ def _vectors_at(points: RigPoints, part: tuple[slice, slice]) -> FloatArray:
 
 
 def _places(
-    plates: Sequence[LightPlate], part: tuple[slice, slice], vectors: FloatArray, *, reduced: int
+    plates: Sequence[LightPlate], part: tuple[slice, slice], vectors: Doubles, *, reduced: int
 ) -> PartPlaces | None:
     """Return where each plate lies in a part of the picture; None where too little is lit by all lamps."""
     if min(side.stop - side.start for side in part) < reduced * CLEAR_PX:
@@ -121,7 +121,7 @@ def _places(
     )
 
 
-def _correlations(one: FloatArray, other: FloatArray) -> FloatArray:
+def _correlations(one: Doubles, other: Doubles) -> Doubles:
     one, other = (each - each.mean(axis=1, keepdims=True) for each in (one, other))
     size = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
     return np.asarray((one * other).sum(axis=1) / np.maximum(size, 1e-30))
@@ -145,7 +145,7 @@ def _smaller(image: NDArray[np.float32], times: int) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _clear(light: NDArray[np.float32], whole: NDArray[np.bool_], vectors: FloatArray) -> NDArray[np.bool_]:
+def _clear(light: NDArray[np.float32], whole: NDArray[np.bool_], vectors: Doubles) -> NDArray[np.bool_]:
     """Return where every lamp shines and clips nothing, with room to the nearest edge of a shadow."""
     strengths = np.linalg.norm(vectors, axis=1).astype(np.float32)
     even = light / np.maximum(strengths, np.float32(1e-9))[:, None, None]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.report.observe.alignment.part_places import PartPlaces
 
 PASSES, LEAST_WEIGHED = 30, 0.3
@@ -32,13 +32,13 @@ class Similarities:
     their standard errors; ``explained`` is the share of what the rig leaves that it explains.
     """
 
-    shift_px: FloatArray
-    zoom: FloatArray
-    turn: FloatArray
-    off_px: FloatArray
-    off_error_px: FloatArray
-    uneven_px: FloatArray
-    uneven_error_px: FloatArray
+    shift_px: Doubles
+    zoom: Doubles
+    turn: Doubles
+    off_px: Doubles
+    off_error_px: Doubles
+    uneven_px: Doubles
+    uneven_error_px: Doubles
     explained: float
 
 
@@ -74,11 +74,11 @@ def similarities(parts: Sequence[PartPlaces]) -> Similarities:
     )
 
 
-def _root_mean_square(moved: FloatArray) -> FloatArray:
+def _root_mean_square(moved: Doubles) -> Doubles:
     return np.asarray(np.sqrt((moved**2).sum(axis=2).mean(axis=1)))
 
 
-def _solved(basis: FloatArray, places: FloatArray) -> tuple[FloatArray, float]:
+def _solved(basis: Doubles, places: Doubles) -> tuple[Doubles, float]:
     """Return one picture's unknowns by its ``places`` (part, 2), and the standard error of a part's coordinate."""
     weights = np.ones(len(places))
     for _ in range(PASSES):

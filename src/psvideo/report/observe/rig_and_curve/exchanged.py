@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 LIGHTS_FOR_EXCHANGE = 6
 """Of fewer lights, other faults than an exchange are explained as well by one."""
@@ -14,7 +14,7 @@ the second of what any other two leave. (Photographs under right rigs: 0.87 and 
 more; a list that is one off: 0.64 and more; two of six to 24 exchanged: mostly 0.2 to 0.6.)"""
 
 
-def exchanged(moments: FloatArray, beyond: FloatArray) -> tuple[int, int] | None:
+def exchanged(moments: Doubles, beyond: Doubles) -> tuple[int, int] | None:
     """Return the two lights that are surely exchanged; None where none are.
 
     ``moments`` (light, light) is the sum of points' light times itself, ``beyond`` projects to what no normal explains.

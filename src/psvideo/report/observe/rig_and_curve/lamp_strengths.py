@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.cho2020 import LEAST_REACHED, fitted
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 SHADOW = 0.1
 """A light reaches a point that gets this share of the brightest one's from it."""
@@ -35,7 +35,7 @@ class LampStrengths:
     turned_deg: float
 
 
-def reaches(light: FloatArray, vectors: FloatArray, share: float) -> NDArray[np.bool_]:
+def reaches(light: Doubles, vectors: Doubles, share: float) -> NDArray[np.bool_]:
     """Return which lights reach a point, (point, light): they give more than a share of the brightest one's ``light``,
     as it is or, of lights that the rig calls weak, over what it sends, ``vectors`` (point or 1, light, 3)."""
     sizes = np.maximum(np.linalg.norm(vectors, axis=2), 1e-12)
@@ -45,7 +45,7 @@ def reaches(light: FloatArray, vectors: FloatArray, share: float) -> NDArray[np.
     return np.asarray((light > share * light.max(axis=1, keepdims=True)) | (by_rig & weak))
 
 
-def lamp_strengths(light: FloatArray, vectors: FloatArray) -> LampStrengths | None:
+def lamp_strengths(light: Doubles, vectors: Doubles) -> LampStrengths | None:
     """Return the strengths that explain points best: ``light`` (point, light), 0 where it is not known, and
     ``vectors`` (point or 1, light, 3), what the rig sends there. None under fewer than FEWEST_LIGHTS, or where
     a light reaches too few points."""

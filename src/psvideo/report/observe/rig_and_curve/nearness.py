@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 RISE = 3.0
 """What a width of the picture adds to a lamp's gain, times its distance in widths: 2.9 at ten widths, 2.7 at three."""
@@ -43,7 +43,7 @@ class Nearness:
         return LEAN_DEG * max(self.rise, 0.0) * self.extent
 
 
-def nearness(unit: FloatArray, beyond: FloatArray, vectors: FloatArray, places: FloatArray) -> Nearness:
+def nearness(unit: Doubles, beyond: Doubles, vectors: Doubles, places: Doubles) -> Nearness:
     """Return how near the lamps are by points that all of them reach.
 
     unit: (point, light), their light as unit vectors; beyond: (light, light), the projector to what no normal explains.
@@ -61,7 +61,7 @@ def nearness(unit: FloatArray, beyond: FloatArray, vectors: FloatArray, places: 
     return Nearness(rise=rise, misfit=left, by_surface=by_surface, extent=float((reach[1] - reach[0]).max()))
 
 
-def _taken_off(plain: FloatArray, risen: FloatArray) -> tuple[float, float]:
+def _taken_off(plain: Doubles, risen: Doubles) -> tuple[float, float]:
     """Return how much of ``risen`` (point, light) is in ``plain``, and what a typical point has left without it."""
     rise = float((plain * risen).sum() / max(float((risen * risen).sum()), 1e-12))
     return rise, float(np.median(np.linalg.norm(plain - rise * risen, axis=1)))

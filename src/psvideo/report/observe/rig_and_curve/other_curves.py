@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.srgb import srgb_share
 
 STEPS = 1025
@@ -25,7 +25,7 @@ class OtherCurves:
     redone: float
 
 
-def other_curves(light: FloatArray, beyond: FloatArray) -> OtherCurves:
+def other_curves(light: Doubles, beyond: Doubles) -> OtherCurves:
     """Return what points (point, light), 1.0 = saturation, leave over under other curves; ``beyond`` projects to what
     no normal explains, (light, light)."""
     steps = np.linspace(0, 1, STEPS) ** 2.4  # as finely where sRGB is steep
@@ -40,6 +40,6 @@ def other_curves(light: FloatArray, beyond: FloatArray) -> OtherCurves:
     )
 
 
-def _left_over(light: FloatArray, beyond: FloatArray) -> float:
+def _left_over(light: Doubles, beyond: Doubles) -> float:
     sizes = np.maximum(np.linalg.norm(light, axis=1), 1e-12)
     return float(np.median(np.linalg.norm(light @ beyond, axis=1) / sizes))

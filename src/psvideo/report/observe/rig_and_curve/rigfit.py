@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.report.observe.rig_and_curve.exchanged import exchanged
 from psvideo.report.observe.rig_and_curve.lamp_strengths import LampStrengths, lamp_strengths, reaches
 from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
@@ -46,7 +46,7 @@ class RigFit:
         return float(np.sqrt(max(self.misfit**2 - self.own_misfit**2, 0.0)))
 
 
-def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = None) -> RigFit | None:
+def rig_fit(light: Doubles, vectors: Doubles, places: Doubles | None = None) -> RigFit | None:
     """Judge a rig by points: ``light`` (point, light) is unclipped, ``vectors`` (point or 1, light, 3) what the rig
     sends there, and ``places`` (point, 2) where they lie, x right and y up in widths of the picture. None for three
     lights, or where too few points are reached by all of them."""
@@ -82,7 +82,7 @@ def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = 
     )  # fmt: skip
 
 
-def _beyond(vectors: FloatArray) -> FloatArray:
+def _beyond(vectors: Doubles) -> Doubles:
     """Return the projectors to what no normal explains, shape (point, light, light)."""
     explained = vectors @ np.linalg.pinv(vectors)
     beyond: NDArray[np.float64] = np.eye(vectors.shape[1]) - explained

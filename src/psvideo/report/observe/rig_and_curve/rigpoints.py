@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.light_field import Points, light_vectors
 from psvideo.model.plan import Plan, PlannedFlash, reference_duration_s
 from psvideo.model.rig import Rig
@@ -24,9 +24,9 @@ class RigPoints:
 
     rows: NDArray[np.intp]
     cols: NDArray[np.intp]
-    vectors: FloatArray
+    vectors: Doubles
 
-    def light(self, one: Round) -> FloatArray:
+    def light(self, one: Round) -> Doubles:
         """Return the light of a round at the points, (point, light); 0 where a plate is clipped or was not seen."""
         columns = []
         for plate in one.plates:
@@ -38,7 +38,7 @@ class RigPoints:
             columns.append(np.where(known, value, 0.0))
         return np.stack(columns, axis=1)
 
-    def fit(self, light: list[FloatArray], firing: NDArray[np.bool_]) -> RigFit | None:
+    def fit(self, light: list[Doubles], firing: NDArray[np.bool_]) -> RigFit | None:
         """Judge the rig by the light of several rounds and the lights that fire, (light,)."""
         if not light:
             return None

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from psvideo.compute.ranks import median
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Rig
 from psvideo.report.observe.rig_and_curve.slopes import (
     BLUR_PX,
@@ -134,10 +134,10 @@ class _Bending(NamedTuple):
     """Normals (point, 3), how they change over a picture's width to the right and upwards, (2, point, 3), and where
     they lie, x and y in such widths from the picture's middle."""
 
-    normals: FloatArray
-    ways: FloatArray
-    x: FloatArray
-    y: FloatArray
+    normals: Doubles
+    ways: Doubles
+    x: Doubles
+    y: Doubles
 
 
 def _bending(seen: Averaged) -> _Bending:
@@ -163,9 +163,7 @@ def _bending(seen: Averaged) -> _Bending:
     return _Bending(normals, cols * np.stack(ways), *place)
 
 
-def _in_view(
-    n: FloatArray, ways: FloatArray, x: FloatArray, y: FloatArray, wide: float
-) -> tuple[FloatArray, FloatArray]:
+def _in_view(n: Doubles, ways: Doubles, x: Doubles, y: Doubles, wide: float) -> tuple[Doubles, Doubles]:
     """Return normals and their changes as a view from far away would have them: along a ray (wide x, wide y, -1) slopes
     of the logarithm of depth are as n1 and n2 over n3 - wide (x n1 + y n2)."""
     seen, changes = n.copy(), ways.copy()
@@ -174,7 +172,7 @@ def _in_view(
     return seen, changes
 
 
-def _crossed(n: FloatArray, ways: FloatArray) -> FloatArray:
+def _crossed(n: Doubles, ways: Doubles) -> Doubles:
     """Return b x db/dx and b x db/dy, (point, 6); what faces the camera counts for more."""
     facing = np.maximum(n[:, 2:] / np.linalg.norm(n, axis=1, keepdims=True), FACING)
     return np.asarray(np.hstack([np.cross(n, ways[0]), np.cross(n, ways[1])]) * facing)
@@ -184,12 +182,12 @@ class _Fitted(NamedTuple):
     """``rows``, c1 and c2 (2, 3); how much of one ``more`` unknown; and how much less that leaves over, as a
     share."""
 
-    rows: FloatArray
+    rows: Doubles
     more: float
     gain: float
 
 
-def _fitted(crossed: FloatArray, more: FloatArray | None, *, near: _Fitted | None = None) -> _Fitted:
+def _fitted(crossed: Doubles, more: Doubles | None, *, near: _Fitted | None = None) -> _Fitted:
     """Find c1 = (1 + a, b, c) and c2 = (d, 1 - a, e): their size is left open. ``more`` (point, 6): what one unknown
     adds to ``crossed``; ``near`` is where to begin."""
     still = crossed[:, 0] + crossed[:, 4]
@@ -209,7 +207,7 @@ def _fitted(crossed: FloatArray, more: FloatArray | None, *, near: _Fitted | Non
     return _Fitted(rows=rows, more=float(found[-1]), gain=none / max(cost, 1e-12) - 1)
 
 
-def _reweighted(slopes: FloatArray, still: FloatArray, found: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _reweighted(slopes: Doubles, still: Doubles, found: Doubles) -> tuple[Doubles, Doubles, float]:
     """Return the unknowns that leave least over of ``still`` (point,), round by round from those ``found``; what they
     leave, and how wide that is. ``slopes`` (unknown, point) is what each adds."""
     for _ in range(ROUNDS):
@@ -223,7 +221,7 @@ def _reweighted(slopes: FloatArray, still: FloatArray, found: FloatArray) -> tup
     return found, left, width
 
 
-def _solved(squares: FloatArray, pull: FloatArray) -> FloatArray:
+def _solved(squares: Doubles, pull: Doubles) -> Doubles:
     """Solve normal equations for what they determine; the rest is 0."""
     sizes = np.sqrt(np.diag(squares)) + 1e-12
     told, ways = np.linalg.eigh(squares / sizes / sizes[:, None])
@@ -231,7 +229,7 @@ def _solved(squares: FloatArray, pull: FloatArray) -> FloatArray:
     return np.asarray(kept @ (kept.T @ (pull / sizes)) / sizes)
 
 
-def _described(rows: FloatArray, gain: float, normals: FloatArray) -> Lean:
+def _described(rows: Doubles, gain: float, normals: Doubles) -> Lean:
     across = np.cross(*rows)
     cofactors = np.vstack([rows, across / np.linalg.norm(across)])
     left, sizes, right = np.linalg.svd(cofactors)
@@ -244,7 +242,7 @@ def _described(rows: FloatArray, gain: float, normals: FloatArray) -> Lean:
     )
 
 
-def _turned_deg(normals: FloatArray, by: FloatArray) -> float:
+def _turned_deg(normals: Doubles, by: Doubles) -> float:
     """Return how far a matrix turns normals (point, 3) in the mean."""
     turned = normals @ by
     cosines = (turned * normals).sum(axis=1) / np.maximum(np.linalg.norm(turned, axis=1), 1e-12)

@@ -8,23 +8,13 @@ a n is the least-squares solution of these equations, which minimises the plates
 from collections.abc import Sequence
 from pathlib import Path
 
+from psvideo.model.arrays import Mask
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.loops.blocks import working_memory
-from psvideo.solve.normals.task import (
-    EVERYTHING,
-    Looks,
-    Mask,
-    Samples,
-    Task,
-    Usable,
-    Work,
-    empty_result,
-    let_rows_go,
-    task,
-)
+from psvideo.solve.normals.task import EVERYTHING, Looks, Samples, Task, Usable, Work, empty_result, let_rows_go, task
 
 __all__ = ["EVERYTHING", "Usable", "solve"]
 

@@ -11,6 +11,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, flattened
 from psvideo.compute.symmetric import adjugate
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import (
     BLOCK,
     LOW,
@@ -29,7 +30,7 @@ from psvideo.solve.normals.loops.blocks import (
 )
 from psvideo.solve.normals.loops.measuring import samples_of
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.task import Floats, Samples, Task
+from psvideo.solve.normals.task import Samples, Task
 
 TWO = np.float32(2)
 RX, RY, RZ, GX, GY, GZ, BX, BY, BZ = (SUMS + BLOCK * plane for plane in range(9))

@@ -8,9 +8,10 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened, pointer
+from psvideo.model.arrays import Bytes, Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, COUNT, LIMIT, MISSING, ONE, SUM, TINY, XX, YY, ZERO, ZZ
 from psvideo.solve.normals.loops.near_kernel import at, place_lights
-from psvideo.solve.normals.task import Bytes, Floats, Samples, Task
+from psvideo.solve.normals.task import Samples, Task
 
 
 @FUSED.inlined

@@ -15,8 +15,9 @@ from numba.extending import overload
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.compute.parts import INLINED
+from psvideo.model.arrays import Floats
 from psvideo.model.irradiance import near_light
-from psvideo.solve.normals.task import Floats, Near, Task
+from psvideo.solve.normals.task import Near, Task
 
 LEAST_COSINE = np.float32(near_light.LEAST_COSINE)
 ONE = np.float32(1)

@@ -4,10 +4,11 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded
+from psvideo.model.arrays import Bytes, Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, ALBEDO, COUNT, LEAST_Z, ONE, SUM, XX, XY, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.colour_kernel import albedo_from_sums
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.task import Bytes, Floats, Result, Samples, Task
+from psvideo.solve.normals.task import Result, Samples, Task
 
 
 @FUSED.called

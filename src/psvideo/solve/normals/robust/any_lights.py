@@ -3,6 +3,7 @@
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.robust.equations import (
@@ -19,7 +20,7 @@ from psvideo.solve.normals.robust.equations import (
     halve,
 )
 from psvideo.solve.normals.robust.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN, median_few
-from psvideo.solve.normals.task import FEW, Floats, Task, Weights
+from psvideo.solve.normals.task import FEW, Task, Weights
 
 MANY = np.float32(FEW)  # usable measurements beyond which the weight narrows
 

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.arrays import Floats, Indices
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
 from psvideo.solve.normals.robust.equations import OUT, PLANES_OF_V, SENT
 from psvideo.solve.normals.robust.reflecting import KEPT, OF_LIGHT
-from psvideo.solve.normals.task import Floats, Indices, Task
+from psvideo.solve.normals.task import Task
 
 WHOLE = 16  # pixels are filled up to whole vectors of this many: what is left over would be solved one by one
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import (
     BLOCK,
     COUNT,
@@ -27,7 +28,6 @@ from psvideo.solve.normals.loops.blocks import (
     Z,
 )
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.task import Floats
 
 HALF = np.float32(0.5)
 HALVINGS = 6  # a quantile is found to a 64th of the interval that holds it

@@ -6,10 +6,11 @@ There nothing is to be weighed down, least squares is the best estimate (Gauss a
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.arrays import Floats, Indices
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.robust.equations import SENT, add_equations, solve_equations
-from psvideo.solve.normals.task import LIGHTS, Floats, Indices, Task
+from psvideo.solve.normals.task import LIGHTS, Task
 
 EXPLAINED_SQUARED = np.float32(4.5**2)  # of eight measurements, noise spoils none in 9999 of 10,000 pixels
 ROUGHLY = np.float32(1e4)  # the condition squared up to which a pixel counts as solved

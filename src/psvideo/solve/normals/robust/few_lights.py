@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import of_light  # noqa: F401 (in a text below)
 from psvideo.solve.normals.robust.equations import FROM, HALF, OUT, RIGHT_X, RIGHT_Y, RIGHT_Z, SCALE, TO
-from psvideo.solve.normals.task import FEW, Floats
+from psvideo.solve.normals.task import FEW
 
 LITTLE = np.float32(0.02)  # the weight of what the start leaves out, so that no start is singular
 FOUR, EIGHT = np.float32(4), np.float32(8)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import Misfit, Subject, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
@@ -20,13 +21,7 @@ from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.solution import Solution
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting, limit_deg, weights
-from psvideo.solve.normals.task import (
-    Floats,
-    Looks,
-    Mask,
-    Samples,
-    Usable,
-)
+from psvideo.solve.normals.task import Looks, Samples, Usable
 
 USABLE = Usable(shadow_ratio=0.4)
 """Least squares needs every measurement; here one that is dark beside the others may go sooner."""

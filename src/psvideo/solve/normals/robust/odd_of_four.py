@@ -9,10 +9,11 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.robust.equations import DOUBT, LOWER, ODD, RANK, SENT, add_equations, solve_equations
-from psvideo.solve.normals.task import Floats, Task
+from psvideo.solve.normals.task import Task
 
 TWO, FOUR = np.float32(2), np.float32(4)
 TINIEST = np.float32(1e-18)

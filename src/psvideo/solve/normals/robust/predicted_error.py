@@ -4,11 +4,12 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.robust.equations import DOUBT, LOWER, SCALE, SENT
 from psvideo.solve.normals.robust.few_lights import EIGHT, FOUR
 from psvideo.solve.normals.robust.odd_of_four import TWO
-from psvideo.solve.normals.task import Floats, Weights
+from psvideo.solve.normals.task import Weights
 
 SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much
 SUSPICION = np.float32(0.05)  # what a highlight among four that was left out still says against the other three

@@ -6,14 +6,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import rows_of
-from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, Values, fitted, joined
-from psvideo.solve.normals.task import Floats, Mask, Samples, Usable
+from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, fitted, joined
+from psvideo.solve.normals.task import Samples, Usable
 
 LIGHTS_FOR_REFLECTANCE = 5
 ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800
@@ -56,7 +57,7 @@ def points_of(
 
 def points_at(
     plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]],
-    usable: Usable, normals: Values, *, seen: Mask | None, black_level: float, scale: float,
+    usable: Usable, normals: Doubles, *, seen: Mask | None, black_level: float, scale: float,
 ) -> SubjectPoints:  # fmt: skip
     """Return what was measured at some rows and columns of the picture, where these are the normals (point, 3); few
     rows are read once each."""
@@ -87,8 +88,8 @@ def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:
 
 
 def _points(
-    samples: Values, lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Mask, usable: Usable,
-    normals: Values,
+    samples: Doubles, lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Mask, usable: Usable,
+    normals: Doubles,
 ) -> SubjectPoints:  # fmt: skip
     samples = samples.reshape(*samples.shape[:2], -1)
     sent = _sent(lit, at)
@@ -111,7 +112,7 @@ def _points(
     )
 
 
-def _sent(lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Values:
+def _sent(lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Doubles:
     """Return what lights of the same intensities send to points: direction times share, (light, point, 3)."""
     field = lit.near
     if field is None:

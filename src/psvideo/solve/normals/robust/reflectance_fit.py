@@ -14,13 +14,10 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
+from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.surface import Reflectance
-from psvideo.solve.normals.task import Mask
-
-Values = NDArray[np.float64]
 
 LEAST_POINTS = 50
 FOR_SHINE = 6
@@ -55,11 +52,11 @@ class SubjectPoints:
     (0 or 1), directions to the lights (light, point, 3), and half way from there to the camera; and ``normals``
     (point, 3) as the points were solved without a model."""
 
-    measured: Values
-    counts: Values
-    towards: Values
-    half: Values
-    normals: Values
+    measured: Doubles
+    counts: Doubles
+    towards: Doubles
+    half: Doubles
+    normals: Doubles
 
     def only(self, known: Mask) -> "SubjectPoints":
         """Return some of the points."""
@@ -113,7 +110,7 @@ def fitted(points: SubjectPoints) -> Reflectance | None:
     return Reflectance(*(float(each) for each in model[:SHINE]), *(float(each) * typical for each in model[SHINE:]))
 
 
-def sizes_of(points: SubjectPoints) -> Values:
+def sizes_of(points: SubjectPoints) -> Doubles:
     """Return the albedo of every point with its normal, 0 where nothing was measured."""
     cosines = np.maximum((points.towards * points.normals).sum(axis=-1), 0.05)
     return _medians(points.measured / cosines, points.counts > 0)
@@ -122,13 +119,13 @@ def sizes_of(points: SubjectPoints) -> Values:
 class ModelFollowed(NamedTuple):
     """A model, what it explains, and the normals that follow it, times albedo."""
 
-    model: Values
+    model: Doubles
     explained: float
-    g: Values
+    g: Doubles
 
 
 def alternated(
-    points: SubjectPoints, g: Values, typical: float, *, rough: bool, turns: int = ALTERNATIONS, least: float = -np.inf
+    points: SubjectPoints, g: Doubles, typical: float, *, rough: bool, turns: int = ALTERNATIONS, least: float = -np.inf
 ) -> ModelFollowed:
     """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
     than the ``least``."""
@@ -143,7 +140,7 @@ def alternated(
     return ModelFollowed(model, explained, g)
 
 
-def explained_evenly(points: SubjectPoints, g: Values, typical: float, model: Values) -> float:
+def explained_evenly(points: SubjectPoints, g: Doubles, typical: float, model: Doubles) -> float:
     """Return which share of the squares of what is left over a model explains, where no measurement counts less than
     others but for OUTLYING times what is typical: what weights found in noise is gone."""
     points = points.in_order()
@@ -155,7 +152,7 @@ def explained_evenly(points: SubjectPoints, g: Values, typical: float, model: Va
     return 1 - after / max(before, 1e-30)
 
 
-def _medians(values: Values, counts: Mask) -> Values:
+def _medians(values: Doubles, counts: Mask) -> Doubles:
     """Return for every point the median over the lights of what counts, 0 where nothing does; (light, point) of both.
 
     All points at once: numpy takes longer to call than to sort so few lights.
@@ -171,7 +168,7 @@ def _medians(values: Values, counts: Mask) -> Values:
     return np.where(number > 0, (lower + upper) / 2, 0.0)
 
 
-def _parts(points: SubjectPoints, g: Values, typical: float) -> Values:
+def _parts(points: SubjectPoints, g: Doubles, typical: float) -> Doubles:
     """Return what was measured, in albedos, and what each number of the model would add, (part, light, point)."""
     from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
 
@@ -180,7 +177,7 @@ def _parts(points: SubjectPoints, g: Values, typical: float) -> Values:
     return parts
 
 
-def _left(points: SubjectPoints, weights: Values, parts: Values) -> Values:
+def _left(points: SubjectPoints, weights: Doubles, parts: Doubles) -> Doubles:
     """Return what a vector of each pixel's own leaves of parts (part, light, point)."""
     from psvideo.solve.normals.robust.reflectance_kernel import take_off_own
 
@@ -189,7 +186,7 @@ def _left(points: SubjectPoints, weights: Values, parts: Values) -> Values:
     return left
 
 
-def _model(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> tuple[Values, float]:
+def _model(points: SubjectPoints, g: Doubles, typical: float, *, rough: bool) -> tuple[Doubles, float]:
     """Return the numbers of the model, and the share of the squares of what is left over that it explains.
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
@@ -214,7 +211,7 @@ def _model(points: SubjectPoints, g: Values, typical: float, *, rough: bool) -> 
     return model, 1 - after / max(before, 1e-30)
 
 
-def _bounded(square: Values, right: Values, *, rough: bool) -> Values:
+def _bounded(square: Doubles, right: Doubles, *, rough: bool) -> Doubles:
     """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, and
     what is ``rough`` is not dark under grazing light as well."""
     from psvideo.solve.normals.robust.reflectance_kernel import descend_within
@@ -226,7 +223,7 @@ def _bounded(square: Values, right: Values, *, rough: bool) -> Values:
     return found
 
 
-def _solved_again(points: SubjectPoints, g: Values, model: Values, typical: float) -> Values:
+def _solved_again(points: SubjectPoints, g: Doubles, model: Doubles, typical: float) -> Doubles:
     """Return g after a step of reweighted Gauss and Newton under the model."""
     from psvideo.solve.normals.robust.reflectance_kernel import solve_again
 

@@ -4,12 +4,10 @@ Arrays are those of ``reflectance_fit.SubjectPoints``: (light, point), direction
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT, FUSED
+from psvideo.model.arrays import Doubles
 from psvideo.solve.normals.task import FEW
-
-Values = NDArray[np.float64]
 
 DESCENTS = 50
 """Mostly far fewer are needed."""
@@ -26,7 +24,7 @@ LONGEST_STEP = 0.3
 
 
 @EXACT.kept
-def descend_within(square: Values, wanted: Values, least: Values, most: Values, found: Values) -> None:
+def descend_within(square: Doubles, wanted: Doubles, least: Doubles, most: Doubles, found: Doubles) -> None:
     """Fill ``found`` with the least of a strictly convex square form within bounds, number by number."""
     size = len(found)
     found[:] = 0.0
@@ -56,7 +54,7 @@ def _roughness(c: float, facing: float, towards: float) -> tuple[float, float, f
 
 
 @FUSED.kept
-def fill_roughness_in_the_fit(angles: Values, found: Values) -> None:
+def fill_roughness_in_the_fit(angles: Doubles, found: Doubles) -> None:
     """Fill ``found`` (3, angle) with what roughness adds and gains; ``angles`` (3, angle) are the cosines between
     normal and light, normal and camera, light and camera."""
     for n in range(angles.shape[1]):
@@ -64,13 +62,13 @@ def fill_roughness_in_the_fit(angles: Values, found: Values) -> None:
 
 
 @FUSED.inlined
-def _along(ways: Values, light: int, point: int, normal: Values) -> float:
+def _along(ways: Doubles, light: int, point: int, normal: Doubles) -> float:
     x, y, z = ways[light, point, 0], ways[light, point, 1], ways[light, point, 2]
     return float(x * normal[0] + y * normal[1] + z * normal[2])
 
 
 @FUSED.inlined
-def _size_and_normal(g: Values, point: int, normal: Values) -> float:
+def _size_and_normal(g: Doubles, point: int, normal: Doubles) -> float:
     size = float(np.sqrt(g[point, 0] ** 2 + g[point, 1] ** 2 + g[point, 2] ** 2))
     for i in range(3):
         normal[i] = g[point, i] / size
@@ -78,7 +76,7 @@ def _size_and_normal(g: Values, point: int, normal: Values) -> float:
 
 
 @FUSED.kept
-def fill_parts(measured: Values, towards: Values, half: Values, g: Values, typical: float, parts: Values) -> None:
+def fill_parts(measured: Doubles, towards: Doubles, half: Doubles, g: Doubles, typical: float, parts: Doubles) -> None:
     """Fill ``parts`` (part, light, point): what was measured, in albedos, and what each number of the model adds."""
     normal = np.empty(3)
     for p in range(len(g)):
@@ -98,7 +96,7 @@ def fill_parts(measured: Values, towards: Values, half: Values, g: Values, typic
 
 
 @FUSED.inlined
-def _add_square(m: Values, weight: float, x: float, y: float, z: float) -> None:
+def _add_square(m: Doubles, weight: float, x: float, y: float, z: float) -> None:
     """Add a vector's square, so often, to a matrix (its upper triangle row by row)."""
     m[0] += weight * x * x
     m[1] += weight * x * y
@@ -109,7 +107,7 @@ def _add_square(m: Values, weight: float, x: float, y: float, z: float) -> None:
 
 
 @FUSED.inlined
-def _solve_symmetric(m: Values, x: Values) -> None:
+def _solve_symmetric(m: Doubles, x: Doubles) -> None:
     """Solve with a positive definite matrix (its upper triangle row by row); the answer stands in ``x``."""
     b, c = m[1] / m[0], m[2] / m[0]
     d = m[3] - b * m[1]
@@ -123,7 +121,7 @@ def _solve_symmetric(m: Values, x: Values) -> None:
 
 
 @FUSED.kept
-def take_off_own(towards: Values, weights: Values, parts: Values, left: Values) -> None:
+def take_off_own(towards: Doubles, weights: Doubles, parts: Doubles, left: Doubles) -> None:
     """Fill ``left`` with what a vector of each pixel's own does not explain of the parts (part, light, point)."""
     matrix, own = np.empty(6), np.empty(3)
     for p in range(parts.shape[2]):
@@ -143,7 +141,7 @@ def take_off_own(towards: Values, weights: Values, parts: Values, left: Values) 
 
 
 @FUSED.kept
-def add_squares(weights: Values, left: Values, square: Values, right: Values) -> None:
+def add_squares(weights: Doubles, left: Doubles, square: Doubles, right: Doubles) -> None:
     """Fill the model's normal equations: sums over lights and points of the weighted products of what each of its
     numbers adds, ``left[1:]``, with each other and with what was measured, ``left[0]``."""
     square[:], right[:] = 0.0, 0.0
@@ -161,7 +159,7 @@ def add_squares(weights: Values, left: Values, square: Values, right: Values) ->
 
 
 @FUSED.inlined
-def _typical(rest: Values, counts: Values, point: int, order: Values) -> float:
+def _typical(rest: Doubles, counts: Doubles, point: int, order: Doubles) -> float:
     """Return what is typical of a point's residuals, of which normal and albedo have taken three."""
     many = 0
     for light in range(len(counts)):
@@ -177,8 +175,8 @@ def _typical(rest: Values, counts: Values, point: int, order: Values) -> float:
 
 @FUSED.kept
 def solve_again(
-    measured: Values, counts: Values, towards: Values, half: Values, g: Values, model: Values, typical: float,
-    found: Values,
+    measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, g: Doubles, model: Doubles, typical: float,
+    found: Doubles,
 ) -> None:  # fmt: skip
     """Fill ``found`` with g (point, 3) after a step of reweighted Gauss and Newton under the model."""
     lights = len(measured)

@@ -8,11 +8,12 @@ lights.
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, COUNT, MISSING, ONE, TINY, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.robust.any_lights import add_weighted, fill_residuals, find_scale
 from psvideo.solve.normals.robust.equations import OUT, SCALE, solve_equations
-from psvideo.solve.normals.task import BROAD, MIDDLE, NARROW, Floats, Weights
+from psvideo.solve.normals.task import BROAD, MIDDLE, NARROW, Weights
 
 STEPS = 4
 FARTHEST = np.float32(0.3)  # so far, beside its length, does g go in one step

@@ -10,6 +10,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, lent
+from psvideo.model.arrays import Bytes, Floats, Indices
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, ONE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.colour_kernel import solve_colours
 from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usable
@@ -21,7 +22,7 @@ from psvideo.solve.normals.robust.explained import list_unexplained, solve_plain
 from psvideo.solve.normals.robust.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
 from psvideo.solve.normals.robust.reflecting import find_ways
 from psvideo.solve.normals.robust.robust_weights import solve_reweighted, weigh
-from psvideo.solve.normals.task import FEW, LIGHTS, Bytes, Floats, Indices, Result, Task, Weights, empty_result
+from psvideo.solve.normals.task import FEW, LIGHTS, Result, Task, Weights, empty_result
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
 LEAST_CHECKED = 5  # usable measurements from which on residuals show how well the lights explain a pixel

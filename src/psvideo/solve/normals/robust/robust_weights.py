@@ -7,13 +7,14 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.robust.any_lights import add_start, add_weighted, choose_start, fill_weights, find_scale
 from psvideo.solve.normals.robust.apart import Room
 from psvideo.solve.normals.robust.equations import solve_equations
 from psvideo.solve.normals.robust.few_lights import begin_few, reweigh_few
 from psvideo.solve.normals.robust.odd_of_four import TWO, drop_odd_of_four
 from psvideo.solve.normals.robust.reflecting import reflect, weigh_reflecting
-from psvideo.solve.normals.task import Floats, Task, Weights
+from psvideo.solve.normals.task import Task, Weights
 
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
 

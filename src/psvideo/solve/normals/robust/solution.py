@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
+from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import (
     FEW,
-    Floats,
     Looks,
-    Mask,
     Result,
     Samples,
     Task,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.solve.normals.task import Floats
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.trust.signs import Signs
 
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.task import Bytes, Floats
+from psvideo.model.arrays import Bytes, Floats
 
 ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)
 TINY = np.float32(1e-9)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.robust.reflectance import FEWEST, ROWS, points_at
@@ -21,12 +22,10 @@ from psvideo.solve.normals.robust.reflectance_fit import (
     LEAST_ROUGH,
     ROUGH,
     SubjectPoints,
-    Values,
     alternated,
     explained_evenly,
     sizes_of,
 )
-from psvideo.solve.normals.task import Floats, Mask
 
 FEWEST_LIGHTS = 4
 """Three lights leave nothing that a model could explain."""
@@ -71,7 +70,7 @@ def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) ->
     return _around(known.shape, (here[0][some], here[1][some]), angles, int(known.sum()))
 
 
-def model_turns_deg(points: SubjectPoints, g: Values) -> Values:
+def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
     """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3), either
     one that shines or one that is rough, whichever is more. A model that explains LEAST_EVENLY counts nothing, one
     that explains twice as much wholly: what comes and goes by its noise would flicker."""
@@ -92,7 +91,7 @@ def _beyond(value: float, least: float) -> float:
 
 
 def _around(
-    shape: tuple[int, ...], at: tuple[NDArray[np.intp], NDArray[np.intp]], angles_deg: Values, points: int
+    shape: tuple[int, ...], at: tuple[NDArray[np.intp], NDArray[np.intp]], angles_deg: Doubles, points: int
 ) -> Floats:
     """Return the mean of angles at rows and columns around every point of a grid."""
     planes = np.zeros((*shape, 2), np.float32)

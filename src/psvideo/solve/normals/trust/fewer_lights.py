@@ -5,7 +5,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.solve.normals.task import PIXEL_CONDITION, Floats
+from psvideo.model.arrays import Floats
+from psvideo.solve.normals.task import PIXEL_CONDITION
 
 FACED = 400
 """This many normals of a ball, evenly spread over its picture, say which lights remain."""

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for, thin
 from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import MEASURED, Misfit, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.surface_bits import bits, stored
-from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
+from psvideo.solve.normals.task import LIGHTS, Samples, Spread
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread

@@ -1,16 +1,15 @@
 """The compiled loops of judging: noise through least squares and what is doubted beyond it, and light in shadow."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
+from psvideo.model.arrays import Bytes, Floats, Indices
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, TINY, ZERO
 from psvideo.solve.normals.loops.measuring import read_block
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
-from psvideo.solve.normals.task import Bytes, Floats, Samples, Spread, Task, Work
+from psvideo.solve.normals.task import Samples, Spread, Task, Work
 
-Places = NDArray[np.uint32]
 TWO, MOST_FIT_DEG, LARGEST_DEG = np.float32(2), np.float32(60), np.float32(180)
 FACING = np.float32(0.05)  # the cosine up to which a light passes a surface by, where such light was not used
 SHADOWED = np.float32(0.25)  # of what a light would give, below which it is hindered
@@ -101,7 +100,7 @@ def add_rows(error: Samples, more: Floats, step: int, first: int, last: int) -> 
 
 
 @FUSED.inlined
-def _fill_between(coarse: Floats, row: int, step: int, ends: Floats, place: Places, way: Floats, line: Floats) -> None:
+def _fill_between(coarse: Floats, row: int, step: int, ends: Floats, place: Indices, way: Floats, line: Floats) -> None:
     """Fill a row from a plane of every ``step``-th row and column; ``ends`` (2, col) is room for what lies at these and
     what it rises by to the next; ``place`` and ``way`` are those of ``_place_columns``."""
     y, one = row // step, ONE / np.float32(step)
@@ -118,7 +117,7 @@ def _fill_between(coarse: Floats, row: int, step: int, ends: Floats, place: Plac
 
 
 @FUSED.inlined
-def _place_columns(step: int, place: Places, way: Floats) -> None:
+def _place_columns(step: int, place: Indices, way: Floats) -> None:
     """Fill for every column before which one of every ``step``-th it lies, and how far it is on its way to the next."""
     one = ONE / np.float32(step)
     for col in range(place.shape[0]):

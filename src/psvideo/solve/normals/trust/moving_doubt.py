@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from psvideo.model.arrays import Floats, Mask
 from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.task import Floats, Mask
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, width_of
 
 MOST_DEG = np.float32(180)

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.model.irradiance.ground import every_ray
 from psvideo.model.irradiance.near_light import NearField, near_vectors
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Floats
 
 POINTS = 160
 """Points along the picture's longer side."""
@@ -26,8 +26,6 @@ LEAST = 1e-4
 FARTHER = 1.05
 """By this depth is multiplied to see how normals turn with it."""
 TINY = 1e-12
-
-Lamps = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +64,7 @@ def _resized(plane: NDArray[np.floating], shape: tuple[int, ...]) -> Floats:
     return np.asarray(cv2.resize(plane.astype(np.float32), shape[1::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _lamps(field: NearField, strength: NDArray[np.floating], step: int, *, farther: float = 1.0) -> Lamps:
+def _lamps(field: NearField, strength: NDArray[np.floating], step: int, *, farther: float = 1.0) -> Doubles:
     """Return at every ``step``-th row and column direction times irradiance of all lamps, (row, col, light, 3)."""
     ground = field.ground
     x, y = every_ray(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
@@ -75,7 +73,7 @@ def _lamps(field: NearField, strength: NDArray[np.floating], step: int, *, farth
     return np.stack([_lamp(field, k, points_m) * strength[k] for k in range(len(strength))], axis=-2)
 
 
-def _lamp(field: NearField, k: int, points_m: Lamps) -> Lamps:
+def _lamp(field: NearField, k: int, points_m: Doubles) -> Doubles:
     """Return direction times irradiance of a lamp at the points, whose irradiance in the middle is 1."""
     if not field.is_near[k]:
         return np.broadcast_to(field.positions_m[k] / np.linalg.norm(field.positions_m[k]), points_m.shape)
@@ -83,19 +81,19 @@ def _lamp(field: NearField, k: int, points_m: Lamps) -> Lamps:
     return np.asarray(near_vectors(points_m, field.positions_m[k], axis=axis, anisotropy=mu) / field.middle_gain[k])
 
 
-def _inverse(lamps: Lamps) -> Lamps:
+def _inverse(lamps: Doubles) -> Doubles:
     """Return the inverses of the normal equations of lamps (..., light, 3); lamps in one line count as a little off."""
     equations = np.swapaxes(lamps, -1, -2) @ lamps
     return np.asarray(np.linalg.inv(equations + TINY * np.eye(3)), np.float64)
 
 
-def _variance(lamps: Lamps) -> NDArray[np.float64]:
+def _variance(lamps: Doubles) -> NDArray[np.float64]:
     """Return what least squares makes across FACING of noise of 1 in every light, for lamps (..., light, 3)."""
     inverse = _inverse(lamps)
     return np.asarray(np.trace(inverse, axis1=-2, axis2=-1) - FACING @ inverse @ FACING, np.float64)
 
 
-def _turned_deg(lamps: Lamps, moved: Lamps) -> NDArray[np.float64]:
+def _turned_deg(lamps: Doubles, moved: Doubles) -> NDArray[np.float64]:
     """Return by how many degrees a normal turns where depth is off by a factor e, from the lamps there and at FARTHER:
     what FACING shows under the first is solved by the second."""
     shown = lamps @ FACING

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
-from psvideo.solve.normals.task import Floats
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots

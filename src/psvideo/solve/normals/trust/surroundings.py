@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Floats
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 
 OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)

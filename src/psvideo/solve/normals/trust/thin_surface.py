@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Bytes, Floats
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.task import Bytes, Floats
 
 AROUND, FAR_AROUND, LEAST_AROUND = 0.1, 0.5, 7
 """The rest is looked at around a point, over such shares of the subject's size (the root of its points), whatever the

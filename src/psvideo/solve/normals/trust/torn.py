@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from psvideo.solve.normals.task import Floats
+from psvideo.model.arrays import Floats
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 
 TORN, NEAR = 5, 9

@@ -7,7 +7,7 @@ over subjects, and of one of them it is a guess: too large for one that is matte
 
 import numpy as np
 
-from psvideo.solve.normals.task import Floats
+from psvideo.model.arrays import Floats
 
 ALL_EXPLAINED = 3
 """This many lights leave no residual."""

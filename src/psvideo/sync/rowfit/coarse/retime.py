@@ -13,14 +13,10 @@ from fractions import Fraction
 from math import gcd
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.row_model import IntArray
-
-Mask = NDArray[np.bool_]
 
 TWIN, TWIN_RECODED, TWIN_SHARE = 0.02, 0.08, 0.15
 """Frames of the same moment differ by at most this share of the rows' spreads; in a movie that was encoded again by the
@@ -59,8 +55,8 @@ class Numbering:
     """
 
     kept: Mask
-    index: IntArray
-    plain: IntArray
+    index: Integers
+    plain: Integers
 
 
 def twins(rows: Profiles) -> Mask:
@@ -110,8 +106,8 @@ def regular(base: Numbering, step: Fraction, lead: int) -> Numbering:
     return Numbering(kept=kept, index=index[new], plain=index[new])
 
 
-def _places(index: IntArray, first: int, step: Fraction, lead: int) -> IntArray:
-    places: IntArray = ((index - first) * step.numerator + lead) // step.denominator
+def _places(index: Integers, first: int, step: Fraction, lead: int) -> Integers:
+    places: Integers = ((index - first) * step.numerator + lead) // step.denominator
     return places
 
 
@@ -146,7 +142,7 @@ def regular_numberings(
     return [regular(base, step, lead) for score, step, lead in best if score < WORTH * best[0][0]]
 
 
-def _alike(change: FloatArray, repeated: Mask) -> bool:
+def _alike(change: Doubles, repeated: Mask) -> bool:
     """Return whether frames that a pattern takes for repeated look it."""
     if not repeated.any() or repeated[1:].all():
         return False
@@ -158,25 +154,25 @@ def fold_frames(plan: Plan, rows: Profiles) -> int:
     return max(64, int(10 * plan.marker_s / rows.period_s))
 
 
-def _differences(rows: Profiles) -> FloatArray:
+def _differences(rows: Profiles) -> Doubles:
     """Return how much every two frames differ, shape (frame, frame)."""
     lit = rows.spread > 0.03 * rows.spread.max()
     value = (rows.value / rows.spread)[:, lit]
-    difference: FloatArray = np.stack([np.minimum(np.abs(value - one), 2.0).mean(axis=1) for one in value])
+    difference: Doubles = np.stack([np.minimum(np.abs(value - one), 2.0).mean(axis=1) for one in value])
     return difference
 
 
-def _cycles(plan: Plan, rows: Profiles, index: IntArray, range_ppm: float) -> FloatArray:
+def _cycles(plan: Plan, rows: Profiles, index: Integers, range_ppm: float) -> Doubles:
     """Return the lengths that a cycle may have, in frames, so close that none slips by more than a quarter flash."""
     shortest_s = plan.shortest_flash_s
     span_s = LARGEST_STEP / 2 * float(index[-1] - index[0] + 1) * rows.period_s
     slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * shortest_s)))
     rate = 1.0 + np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm * 1e-6
-    cycles: FloatArray = rate * plan.cycle_s / rows.period_s
+    cycles: Doubles = rate * plan.cycle_s / rows.period_s
     return cycles
 
 
-def _folded(difference: FloatArray, place: IntArray, cycle_frames: FloatArray) -> FloatArray:
+def _folded(difference: Doubles, place: Integers, cycle_frames: Doubles) -> Doubles:
     """Return the mean difference of neighbours once frames are folded to each of the cycles, shape (cycle,)."""
     phase = place % cycle_frames[:, None]
     order = np.argsort(phase, axis=1)
@@ -188,11 +184,11 @@ def _folded(difference: FloatArray, place: IntArray, cycle_frames: FloatArray) -
         apart = (gap / NEAR_FRAMES) ** 2 + ((place[order] - place[other]) / TOGETHER_FRAMES) ** 2
         weight = 1.0 / (1.0 + apart)
         sums += (weight * difference[order, other]).sum(axis=1), weight.sum(axis=1)
-    mean: FloatArray = sums[0] / sums[1]
+    mean: Doubles = sums[0] / sums[1]
     return mean
 
 
-def regular_step(index: Sequence[int] | IntArray, numbered: Sequence[int] | IntArray) -> Fraction:
+def regular_step(index: Sequence[int] | Integers, numbered: Sequence[int] | Integers) -> Fraction:
     """Return by how many frames a clip goes on per frame of its numbering, where that is regular; 1 elsewhere.
 
     >>> regular_step([0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13], range(11)), regular_step([0, 1, 2, 3, 5, 6, 7], range(7))

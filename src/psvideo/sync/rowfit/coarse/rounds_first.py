@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_between
@@ -66,5 +66,5 @@ def _in_code(
 
 def _middle_s(plan: Plan, rows: Profiles) -> float:
     """Return the middle of the short stretch."""
-    first: FloatArray = rows.frame_start_s[:1]
+    first: Doubles = rows.frame_start_s[:1]
     return float(first[0]) + 0.5 * SHORT_ROUNDS * plan.cycle_s / len(plan.dark_rounds)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import kernel, row_model
 from psvideo.sync.rowfit.beat import Beat, FoundClock
@@ -57,7 +57,7 @@ def search(
     return _over_readouts(rows, loss, clocks, phases_s, start, keep)
 
 
-def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) -> FloatArray:
+def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) -> Doubles:
     """Return every clock's mean loss over the rows (clock,); infinite where a few of the rows show it to be high."""
     height = len(rows.place)
     few = np.zeros(height, np.bool_)
@@ -71,31 +71,29 @@ def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) ->
     return loss
 
 
-def _sum_over(
-    plan: Plan, rows: Profiles, among: NDArray[np.bool_], clocks: list[FoundClock], start: Beat
-) -> FloatArray:
+def _sum_over(plan: Plan, rows: Profiles, among: NDArray[np.bool_], clocks: list[FoundClock], start: Beat) -> Doubles:
     """Return every clock's loss (clock,), summed over some of the rows."""
     part = rows.only_rows(among)
-    total: FloatArray = losses(plan, part, clocks, start, place=part.place).sum(axis=1)
+    total: Doubles = losses(plan, part, clocks, start, place=part.place).sum(axis=1)
     return total
 
 
-def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, FloatArray]:
+def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[Doubles, Doubles]:
     shortest_s = plan.shortest_flash_s
     steps = int(np.ceil(plan.cycle_s / (shortest_s / 3)))
-    phases_s: FloatArray = np.arange(steps, dtype=np.float64) * (plan.cycle_s / steps)
+    phases_s: Doubles = np.arange(steps, dtype=np.float64) * (plan.cycle_s / steps)
     return phases_s, clock_ratios_ppm(plan, rows, range_ppm)
 
 
-def clock_ratios_ppm(plan: Plan, rows: Profiles, range_ppm: float) -> FloatArray:
+def clock_ratios_ppm(plan: Plan, rows: Profiles, range_ppm: float) -> Doubles:
     """Return the clock ratios of the grid: half a flash's slip over the frames apart, up to ``range_ppm``."""
     span_s = float(rows.frame_start_s[-1] - rows.frame_start_s[0]) + rows.period_s
     slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * plan.shortest_flash_s)))
-    ppm: FloatArray = np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm if slips else np.zeros(1)
+    ppm: Doubles = np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm if slips else np.zeros(1)
     return ppm
 
 
-def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: FloatArray) -> FloatArray:
+def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: Doubles) -> Doubles:
     """Return the loss of every clock in every row, shape (clock, row)."""
     first_s, last_s = float(rows.frame_start_s[0]), float(rows.frame_start_s[-1])
     latest_s = max(clock.phase_s for clock in clocks)
@@ -122,9 +120,9 @@ def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *,
 
 def _over_readouts(
     rows: Profiles,
-    loss: FloatArray,
+    loss: Doubles,
     clocks: list[FoundClock],
-    phases_s: FloatArray,
+    phases_s: Doubles,
     start: Beat,
     keep: int,
 ) -> list[GridPlace]:
@@ -159,7 +157,7 @@ def _over_readouts(
     return found
 
 
-def _best(loss: FloatArray, keep: int) -> list[tuple[int, int, int, float]]:
+def _best(loss: Doubles, keep: int) -> list[tuple[int, int, int, float]]:
     """Return the lowest places of a cube, no two of them neighbours in phase."""
     left = loss.copy()
     found = []

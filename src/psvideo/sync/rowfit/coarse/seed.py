@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.retime import (
     BESIDE,
-    Mask,
     Numbering,
     as_numbered,
     fold_frames,
@@ -217,7 +216,7 @@ def first_guess(plan: Plan) -> Beat:
     )
 
 
-def gain_of(rows: Profiles, rest: FloatArray) -> float:
+def gain_of(rows: Profiles, rest: Doubles) -> float:
     """Return which share of the robust loss that each row's mean leaves in every window a fit takes away."""
     bounds = np.append(rows.window_start, len(rows.value))
     means = np.repeat(

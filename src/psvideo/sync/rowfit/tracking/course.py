@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.model.arrays import Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.ends import ends
 from psvideo.sync.rowfit.tracking.holes import NEAR, settled, with_repeats
 from psvideo.sync.rowfit.tracking.instead import without_false_repeats
@@ -35,7 +35,7 @@ class Course:
 
     track: FrameTrack
     trusted: tuple[int, int]
-    unsure: IntArray
+    unsure: Integers
     steps: int
     strayed: int
     share: float
@@ -81,10 +81,10 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     )
 
 
-def _beside_steps(rows: Profiles, tracked: FrameTrack, places: IntArray) -> IntArray:
+def _beside_steps(rows: Profiles, tracked: FrameTrack, places: Integers) -> Integers:
     """Return those places in time that lie near a hole or a repeat, which may have been taken back since."""
     odd = tracked.index[:-1][np.diff(tracked.index) != np.diff(rows.index)]
-    near: IntArray = places[(np.abs(places[:, None] - odd) <= NEAR).any(axis=1)]
+    near: Integers = places[(np.abs(places[:, None] - odd) <= NEAR).any(axis=1)]
     return near
 
 

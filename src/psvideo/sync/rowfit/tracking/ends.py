@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.holes import MEMORY
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
 from psvideo.sync.rowfit.tracking.steps_ahead import MOST
@@ -33,12 +32,12 @@ usual: short holes are likelier than long ones."""
 class ClipEnds:
     """Where the frames are in time, ``index`` (frame,), and how many at either end fit no place at all."""
 
-    index: IntArray
+    index: Integers
     lost_first: int
     lost_last: int
 
 
-def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> ClipEnds:
+def ends(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> ClipEnds:
     """Return the places in time (frame,) with holes beside the first and the last frames found."""
     last, lost_last = _end(plan, rows, index, beat)
     turned = replace(rows, value=np.ascontiguousarray(rows.value[::-1]))
@@ -46,7 +45,7 @@ def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> ClipEnds:
     return ClipEnds(index=first[::-1].copy(), lost_first=lost_first, lost_last=lost_last)
 
 
-def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntArray, int]:
+def _end(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> tuple[Integers, int]:
     """Return the places with the end of the arrays put where it fits, and how many frames there fit nowhere.
 
     From the inside outwards, so that nothing is predicted from frames that are odd themselves. A frame in the dark that
@@ -75,13 +74,13 @@ def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntAr
     return index, 0
 
 
-def _usual(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice) -> float:
+def _usual(plan: Plan, rows: Profiles, index: Integers, beat: Beat, known: slice) -> float:
     """Return how badly the last of the known frames are predicted by those before them."""
     learnt = slice(known.start, known.stop - BEFORE)
     return float(_fits(plan, rows, index, beat, learnt, index[known.stop - BEFORE : known.stop]).max())
 
 
-def _fits(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice, places: IntArray) -> FloatArray:
+def _fits(plan: Plan, rows: Profiles, index: Integers, beat: Beat, known: slice, places: Integers) -> Doubles:
     """Return how badly the frames after the known ones fit some places in time, shape (place,)."""
     learnt = _ordered(rows, index, known)
     light = brightnesses(plan, learnt, beat)
@@ -93,7 +92,7 @@ def _fits(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice,
     return found
 
 
-def _ordered(rows: Profiles, index: IntArray, frames: slice) -> Profiles:
+def _ordered(rows: Profiles, index: Integers, frames: slice) -> Profiles:
     """Return some frames in the order of time."""
     order = np.argsort(index[frames], kind="stable")
     value = np.ascontiguousarray(rows.value[frames][order])

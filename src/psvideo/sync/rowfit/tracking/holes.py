@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import Mask
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 
@@ -21,7 +19,7 @@ MEMORY, NEAR = 24, 10
 """Frames on either side of a hole that show where it is, and how far from where it was found it may be."""
 
 
-def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntArray, Mask]:
+def settled(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> tuple[Integers, Mask]:
     """Return the frames' places with every hole moved to where it explains the frames around it best, and the frames
     (frame,) that may as well lie on the other side of one.
 
@@ -68,7 +66,7 @@ def with_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask) ->
     return replace(tracked, index=np.maximum.accumulate(index))
 
 
-def _fits(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask, block: slice, places: IntArray) -> FloatArray:
+def _fits(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask, block: slice, places: Integers) -> Doubles:
     """Return how badly frames fit at some places in time, shape (frame of the block,), by the frames around them."""
     near = slice(max(block.start - MEMORY, 0), min(block.stop + MEMORY, len(kept)))
     known = np.cumsum(kept)[near][kept[near]] - 1

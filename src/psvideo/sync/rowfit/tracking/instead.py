@@ -10,12 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import row_model
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, compiled_rows
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.holes import MEMORY, NATURAL
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 from psvideo.sync.rowfit.tracking.track import FrameTrack
@@ -39,7 +38,7 @@ def without_false_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack) -> Fr
     return replace(tracked, index=index)
 
 
-def _cancelled(index: IntArray, numbered: IntArray) -> Iterator[slice]:
+def _cancelled(index: Integers, numbered: Integers) -> Iterator[slice]:
     """Yield the stretches of frames that are displaced between a hole and a repeat that cancel one another."""
     more = index - numbered
     displaced = np.flatnonzero(np.diff(more))
@@ -49,7 +48,7 @@ def _cancelled(index: IntArray, numbered: IntArray) -> Iterator[slice]:
             yield slice(before + 1, after + 1)
 
 
-def _as_well(plan: Plan, rows: Profiles, beat: Beat, index: IntArray, moved: IntArray, stretch: slice) -> bool:
+def _as_well(plan: Plan, rows: Profiles, beat: Beat, index: Integers, moved: Integers, stretch: slice) -> bool:
     """Return whether frames fit as well at the places ``moved`` once a flash that they see, or a frame, is left out."""
     near = slice(max(stretch.start - MEMORY, 0), min(stretch.stop + MEMORY, len(index)))
     asked = slice(max(stretch.start - BESIDE, near.start), min(stretch.stop + BESIDE, near.stop))
@@ -74,19 +73,19 @@ def _dark(flashes: row_model.Flashes, one: int) -> row_model.Flashes:
     return flashes._replace(unknown=unknown)
 
 
-def _black(shown: FloatArray, frame: int) -> FloatArray:
+def _black(shown: Doubles, frame: int) -> Doubles:
     black = shown.copy()
     black[frame] = 0.0
     return black
 
 
-def _shown(rows: Profiles, beat: Beat, flashes: row_model.Flashes, light: FloatArray) -> FloatArray:
+def _shown(rows: Profiles, beat: Beat, flashes: row_model.Flashes, light: Doubles) -> Doubles:
     """Return what known brightnesses predict under some flashes, shape (frame, row)."""
     found = np.empty_like(rows.value)
     row_model.predictions(compiled_rows(rows, beat), flashes, light, 0, rows.value.shape[1], found)
     return found
 
 
-def _left(rows: Profiles, shown: FloatArray) -> FloatArray:
+def _left(rows: Profiles, shown: Doubles) -> Doubles:
     """Return how badly frames fit what was predicted, shape (frame,)."""
     return frame_losses(rows, rows.value - shown)

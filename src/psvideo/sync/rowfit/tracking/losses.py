@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.search import ROBUST_STEEPNESS
@@ -12,15 +12,15 @@ SUSPICIOUS = 0.25
 """A frame's loss by which it must exceed what is usual before other places in time are tried for it."""
 
 
-def frame_losses(rows: Profiles, rest: FloatArray) -> FloatArray:
+def frame_losses(rows: Profiles, rest: Doubles) -> Doubles:
     """Return every frame's mean robust loss over the rows that change, shape (frame,)."""
     spread = rows.spread
     lit = spread > 0.03 * spread.max()
-    losses: FloatArray = np.log1p(ROBUST_STEEPNESS * (rest[:, lit] / spread[lit]) ** 2).mean(axis=1)
+    losses: Doubles = np.log1p(ROBUST_STEEPNESS * (rest[:, lit] / spread[lit]) ** 2).mean(axis=1)
     return losses
 
 
-def losses_of(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+def losses_of(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: Doubles) -> Doubles:
     """Return how badly known brightnesses predict frames, shape (frame,), on the scale of the reference's spreads."""
     rest = rows.value - predictions(plan, rows, beat, light)
     return frame_losses(reference, rest)

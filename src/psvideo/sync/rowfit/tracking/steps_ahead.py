@@ -8,12 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import Mask
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 
 BLOCK = 16
@@ -30,7 +28,7 @@ HOLDS = 1.0
 """A step is believed where it takes away this share of the frames' losses once brightnesses are fitted again."""
 
 
-def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Mask, sign: int) -> IntArray:
+def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Mask, sign: int) -> Integers:
     """Return by how many frames more than the numbering says the frames of the next block are away, shape (frame,).
 
     Where all is as usual, this is for the whole block; where not, for its nearer half, so that the other half is looked
@@ -55,12 +53,12 @@ def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: sli
     return course[:nearer] if sign > 0 else course[-nearer:]
 
 
-def _calm(loss: FloatArray, usual: float) -> bool:
+def _calm(loss: Doubles, usual: float) -> bool:
     odd = np.convolve(loss, [0.5, 0.5], mode="same") if len(loss) > 1 else loss
     return bool(odd.max() < usual + SUSPICIOUS)
 
 
-def _losses_but_for_gain(plan: Plan, learnt: Profiles, ahead: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+def _losses_but_for_gain(plan: Plan, learnt: Profiles, ahead: Profiles, beat: Beat, light: Doubles) -> Doubles:
     """Return how badly known brightnesses predict frames (frame,) that may all be brighter or darker by a gain of
     their own, as where a camera sets its exposure: missing frames would stand for it otherwise."""
     expected = predictions(plan, ahead, beat, light)
@@ -70,7 +68,7 @@ def _losses_but_for_gain(plan: Plan, learnt: Profiles, ahead: Profiles, beat: Be
     return frame_losses(learnt, rest)
 
 
-def with_steps(index: IntArray, block: slice, extra: IntArray, sign: int) -> IntArray:
+def with_steps(index: Integers, block: slice, extra: Integers, sign: int) -> Integers:
     """Return frames' places in time with those of a block ``extra`` (frame of the block,) farther away, and all frames
     beyond it as far as its last."""
     moved = index.copy()
@@ -82,7 +80,7 @@ def with_steps(index: IntArray, block: slice, extra: IntArray, sign: int) -> Int
     return moved
 
 
-def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, course: IntArray, sign: int) -> bool:
+def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, course: Integers, sign: int) -> bool:
     """Return whether a course still wins when brightnesses are fitted again to all frames from the known ones on.
 
     Frames that move are predicted badly; fitted along a wrong course they stay bad, along the right one they do not.
@@ -98,7 +96,7 @@ def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, c
     return float(gain.sum()) > HOLDS
 
 
-def _cheapest(table: FloatArray, twin: Mask) -> IntArray:
+def _cheapest(table: Doubles, twin: Mask) -> Integers:
     """Return the course of least cost through a table (frame, extra); no frame comes before the one before it."""
     extras = np.arange(LEAST, MOST + 1)
     step = extras[None, :] - extras[:, None]  # from the row's state to the column's

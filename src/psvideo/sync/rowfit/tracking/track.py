@@ -10,14 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import Mask
 from psvideo.sync.rowfit.coarse.retime import twins as twin_frames
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
-from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses
 from psvideo.sync.rowfit.tracking.steps_ahead import BLOCK, steps_ahead, with_steps
 
@@ -34,10 +32,10 @@ class FrameTrack:
     after the strobe started again, where that was looked for: frames beyond are not followed.
     """
 
-    index: IntArray
+    index: Integers
     beat: Beat
-    at_s: FloatArray
-    late_s: FloatArray
+    at_s: Doubles
+    late_s: Doubles
     leaps: tuple[int, ...] = ()
 
     @property
@@ -46,7 +44,7 @@ class FrameTrack:
         return np.append(False, np.diff(self.index) == 0)
 
 
-Leap = Callable[[Plan, Profiles, Beat, slice, slice, IntArray, int], int | None]
+Leap = Callable[[Plan, Profiles, Beat, slice, slice, Integers, int], int | None]
 """Returns at which frame the strobe started again among frames ahead, if it did: from the plan, the rows, the beat,
 frames that are known, frames ahead, how many frames more than numbered each of those is away, and 1, or -1 towards the
 clip's beginning."""
@@ -74,7 +72,7 @@ class _Followed:
     """One way through the clip: every frame's place in time, the frames that were followed, ``(at_s, late_s)`` after
     each block, and the frame at which the strobe started again, if it did."""
 
-    index: IntArray
+    index: Integers
     span: slice
     late: list[tuple[float, float]]
     leaps: tuple[int, ...] = ()
@@ -131,7 +129,7 @@ def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, i
     return seed.start + first, seed.start + first + length
 
 
-def _losses_of_most(plan: Plan, rows: Profiles, beat: Beat) -> FloatArray:
+def _losses_of_most(plan: Plan, rows: Profiles, beat: Beat) -> Doubles:
     """Return every frame's loss under brightnesses that most frames agree on, shape (frame,).
 
     Two frames at wrong places in time spoil brightnesses so much that frames at right ones look as odd.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.normal_equations import projected
@@ -27,8 +27,8 @@ WANDERING = np.geomspace(1e-18, 1e-6, 49)
 class _Knots:
     """Knots and what is known of bends at them: ``penalty`` / strength is their precision."""
 
-    at_s: FloatArray
-    penalty: FloatArray
+    at_s: Doubles
+    penalty: Doubles
 
 
 def fitted(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:
@@ -96,7 +96,7 @@ def _knots(rows: Profiles) -> _Knots:
     return _Knots(at_s=at_s, penalty=second.T @ (second / spacing_s[:, None]))
 
 
-def _basis(knots: int, free: tuple[str, ...]) -> FloatArray:
+def _basis(knots: int, free: tuple[str, ...]) -> Doubles:
     basis = np.zeros((knots + len(GLOBALS), knots + len(free)))
     basis[:knots, :knots] = np.eye(knots)
     names = list(GLOBALS)
@@ -105,14 +105,14 @@ def _basis(knots: int, free: tuple[str, ...]) -> FloatArray:
     return basis
 
 
-def _known(hessian: FloatArray, knots: _Knots, strength: float, inflation: float) -> FloatArray:
+def _known(hessian: Doubles, knots: _Knots, strength: float, inflation: float) -> Doubles:
     size = len(knots.at_s)
     known = 1e-9 * np.diag(np.diag(hessian) + 1e-30)
     known[:size, :size] += inflation * knots.penalty / strength
     return known
 
 
-def _inflation(hessian: FloatArray, scores: FloatArray, rows: Profiles) -> float:
+def _inflation(hessian: Doubles, scores: Doubles, rows: Profiles) -> float:
     """Return by how much shifts of neighbouring windows differ more than noise alone explains (variances' ratio)."""
     knots = len(rows.window_start) + 1
     window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
@@ -126,7 +126,7 @@ def _inflation(hessian: FloatArray, scores: FloatArray, rows: Profiles) -> float
     return max(float(np.median(bent**2 / expected)) / 0.455, 1.0)
 
 
-def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots) -> tuple[float, float]:
+def _wandering(hessian: Doubles, pull: Doubles, beat: Beat, knots: _Knots) -> tuple[float, float]:
     """Return the most likely strength of the rate's random walk, and its log-likelihood above a straight clock's."""
     from scipy.linalg import cho_solve_banded, cholesky_banded  # runs with a timing do without scipy
 
@@ -151,7 +151,7 @@ def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots)
     return float(WANDERING[best]), float(likelihood[best] - likelihood[straight])
 
 
-def _bands(matrix: FloatArray) -> FloatArray:
+def _bands(matrix: Doubles) -> Doubles:
     """Return the diagonal and the two below it, one a row: knots act on their neighbours only."""
     bands = np.zeros((3, len(matrix)))
     for below in range(3):
@@ -159,17 +159,17 @@ def _bands(matrix: FloatArray) -> FloatArray:
     return bands
 
 
-def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], move: FloatArray) -> Beat:
+def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], move: Doubles) -> Beat:
     size = len(knots.at_s)
     clock = beat.clock.bent(knots.at_s, move[:size])
     return replace(beat, clock=clock, **times_moved(rows, beat, free, move[size:]))
 
 
-def late_s(one: Beat, other: Beat, at_s: FloatArray) -> FloatArray:
+def late_s(one: Beat, other: Beat, at_s: Doubles) -> Doubles:
     """Return by how much flashes of another clock come later than the flashes of one do at some times, same shape."""
     strobe_s = (at_s - one.clock.phase_s) / one.clock.rate
     straight_s = other.clock.phase_s + strobe_s * other.clock.rate
-    late: FloatArray = straight_s + other.clock.bend(straight_s) - at_s - one.clock.bend(at_s)
+    late: Doubles = straight_s + other.clock.bend(straight_s) - at_s - one.clock.bend(at_s)
     return late
 
 

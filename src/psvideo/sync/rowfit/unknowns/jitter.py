@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import projection
 from psvideo.sync.rowfit.coarse.seed import gain_of
@@ -53,12 +53,12 @@ class Jitter:
     ``mean_error_s`` is the standard error of what all have in common.
     """
 
-    start_s: FloatArray
-    late_s: FloatArray
+    start_s: Doubles
+    late_s: Doubles
     error_s: float
     mean_error_s: float = 0.0
 
-    def of(self, start_s: FloatArray) -> FloatArray:
+    def of(self, start_s: Doubles) -> Doubles:
         """Return by how much the flashes that start at these times come late, same shape; 0 for others."""
         if not len(self.start_s):
             return np.zeros_like(start_s)
@@ -66,7 +66,7 @@ class Jitter:
         before = np.maximum(after - 1, 0)
         nearest = np.where(start_s - self.start_s[before] < self.start_s[after] - start_s, before, after)
         same = np.abs(self.start_s[nearest] - start_s) < 1e-7
-        late_s: FloatArray = np.where(same, self.late_s[nearest], 0.0)
+        late_s: Doubles = np.where(same, self.late_s[nearest], 0.0)
         return late_s
 
 
@@ -125,7 +125,7 @@ def maybe_astray_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     return 0.0 if straying is None else straying[0]
 
 
-def _halves(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[FloatArray, FloatArray]:
+def _halves(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[Doubles, Doubles]:
     """Return how strongly even and odd rows shift each flash, shape (flash, 2) twice, as ``pulls`` does."""
     halves = [pulls(rows.only_rows(half), fit, flashes, half) for half in (slice(0, None, 2), slice(1, None, 2))]
     pull, stiff = (np.stack([half[n].sum(axis=1) for half in halves], axis=1) for n in (0, 1))
@@ -144,13 +144,13 @@ def _likeness_of_rows(rows: Profiles, fit: Fit, flashes: Flashes) -> float:
     return float((one * next_one).mean() / max(float((one**2).mean() * (next_one**2).mean()) ** 0.5, 1e-30))
 
 
-def _timed(stiff: FloatArray) -> NDArray[np.bool_]:
+def _timed(stiff: Doubles) -> NDArray[np.bool_]:
     """Return which flashes (flash,) both kinds of rows show, from stiffnesses (flash, 2)."""
     usual = np.array([np.median(one[one > 0]) if (one > 0).any() else np.inf for one in stiff.T])
     return np.asarray((stiff > ENOUGH * usual).all(axis=1), np.bool_)
 
 
-def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float, sure: float = SURE) -> tuple[float, float] | None:
+def _agreed(pull: Doubles, stiff: Doubles, *, over: float, sure: float = SURE) -> tuple[float, float] | None:
     """Return by how much flashes stray and the noise, as two kinds of rows (flash, 2) show both.
 
     None where they do not agree by ``sure`` standard deviations, or on no more than ``over`` times what noise makes of
@@ -172,14 +172,14 @@ def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float, sure: float = S
     return float(np.sqrt(common)), noise
 
 
-def moved_flashes(flashes: Flashes, late_s: FloatArray) -> Flashes:
+def moved_flashes(flashes: Flashes, late_s: Doubles) -> Flashes:
     """Return the flashes as late as they were found; they stay in order."""
     return flashes._replace(start_s=np.maximum.accumulate(flashes.start_s + late_s))
 
 
 def pulls(
     rows: Profiles, fit: Fit, flashes: Flashes, among: slice | NDArray[np.bool_] = slice(None), *, robust: bool = True
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Doubles, Doubles]:
     """Return how strongly rows that open and rows that close shift each flash, shape (flash, 2) twice.
 
     ``rows`` are those ``among`` the fit's own. Not ``robust``, large residuals pull as much as they are large.

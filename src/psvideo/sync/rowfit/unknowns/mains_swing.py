@@ -8,7 +8,7 @@ turns from window to window; one frequency must explain all of them.
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rows.ripple import MOST_SWING, Ripple
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses
@@ -42,7 +42,7 @@ def mains_swing(plan: Plan, rows: Profiles, fit: Fit) -> Ripple | None:
     return Ripple(hz=fit.beat.beat_hz[0] + float(off_hz[best]), amplitude=common, error=error)
 
 
-def _by_window(plan: Plan, rows: Profiles, fit: Fit) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
+def _by_window(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Doubles, NDArray[np.complex128], Doubles]:
     """Return the windows' middles, the amplitude against the nominal frequency, and what it is worth, (window,)."""
     bounds = np.append(rows.window_start, len(rows.value))
     found = []

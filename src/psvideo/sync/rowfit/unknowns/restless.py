@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from psvideo.compute.compiled import EXACT
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
@@ -64,13 +64,13 @@ def across(plan: Plan, rows: Profiles, fit: Fit) -> float:
     return max(1.0 - robust_loss(rows, fit.rest, fit.rest) / max(usual, 1e-30), 0.0)
 
 
-def _variance(samples: FloatArray) -> float:
+def _variance(samples: Doubles) -> float:
     known = samples[np.isfinite(samples)]
     return (1.4826 * float(np.median(np.abs(known)))) ** 2 if len(known) >= LEAST else 0.0
 
 
 @EXACT.kept
-def _parts(rows: Rows, flashes: Flashes, rest: FloatArray, whole: FloatArray, split: FloatArray) -> None:
+def _parts(rows: Rows, flashes: Flashes, rest: Doubles, whole: Doubles, split: Doubles) -> None:
     """Fill in (frame, row) the residuals of frames that saw a whole flash, and those across a flash that two saw."""
     frames, height = rest.shape
     for row in range(height):

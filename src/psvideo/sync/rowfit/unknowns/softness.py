@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
@@ -88,5 +88,5 @@ def misfit(plan: Plan, rows: Profiles, fit: Fit) -> float:
     edges = at_edges(plan, rows, fit.beat)
     if min(edges.sum(), (~edges).sum()) < FEW:
         return 1.0
-    squares: FloatArray = np.minimum((fit.rest / errors_of_residuals(rows, fit.rest, 0.0)) ** 2, OUTLIER**2)
+    squares: Doubles = np.minimum((fit.rest / errors_of_residuals(rows, fit.rest, 0.0)) ** 2, OUTLIER**2)
     return max(float(np.sqrt(squares[edges].mean() / max(squares[~edges].mean(), 1e-30))), 1.0)

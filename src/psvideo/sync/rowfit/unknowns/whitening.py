@@ -5,13 +5,13 @@ saw. Flashes touch neighbouring frames only, so that its Cholesky factor has a d
 """
 
 from psvideo.compute.compiled import EXACT
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.model.rows.shutter import REACH
 from psvideo.sync.rowfit.row_model import Flashes, Rows, seen_of
 
 
 @EXACT.kept
-def factors(rows: Rows, flashes: Flashes, row: int, diagonal: FloatArray, below: FloatArray) -> None:
+def factors(rows: Rows, flashes: Flashes, row: int, diagonal: Doubles, below: Doubles) -> None:
     """Fill a row's Cholesky factor, ``diagonal`` and ``below`` it, (frame,) each; windows are independent."""
     tail_s = REACH * flashes.fall_s
     k = window = 0
@@ -37,7 +37,7 @@ def factors(rows: Rows, flashes: Flashes, row: int, diagonal: FloatArray, below:
 
 
 @EXACT.kept
-def whiten(column: FloatArray, diagonal: FloatArray, below: FloatArray) -> None:
+def whiten(column: Doubles, diagonal: Doubles, below: Doubles) -> None:
     """Whiten one value for every frame, in place."""
     column[0] /= diagonal[0]
     for n in range(1, len(column)):
@@ -45,7 +45,7 @@ def whiten(column: FloatArray, diagonal: FloatArray, below: FloatArray) -> None:
 
 
 @EXACT.kept
-def whiten_all(columns: FloatArray, diagonal: FloatArray, below: FloatArray, first: int, last: int) -> None:
+def whiten_all(columns: Doubles, diagonal: Doubles, below: Doubles, first: int, last: int) -> None:
     """Whiten the frames ``first`` to ``last`` of several values (frame, value), in place; a window begins there."""
     for n in range(first, last):
         for i in range(columns.shape[1]):

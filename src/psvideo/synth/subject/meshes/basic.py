@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.synth.subject.shape import Shape, make_shape, merged
 
 Paint = tuple[float, float, float]
@@ -79,7 +79,7 @@ def lathe(outline: Sequence[tuple[float, float] | None], *, columns: int = 160, 
     return merged(*(painted(piece, paint) for piece, paint in zip(turned, paints, strict=True)))
 
 
-def _turned(points: FloatArray, columns: int) -> Shape:
+def _turned(points: Doubles, columns: int) -> Shape:
     around = 2 * np.pi * np.arange(columns) / columns
     radius, y = points[:, :1], points[:, 1:]
     ring = np.stack(np.broadcast_arrays(radius * np.sin(around), y, radius * np.cos(around)), axis=-1).reshape(-1, 3)

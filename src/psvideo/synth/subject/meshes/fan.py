@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.synth.subject.meshes.basic import Paint, grid_faces, lathe, painted, tube
 from psvideo.synth.subject.shape import Shape, make_shape, merged
 
@@ -84,12 +84,12 @@ def fan_cage() -> Shape:
     return merged(*(painted(wire, STEEL) for wire in [*wires, *rim]), *dark, foot)
 
 
-def _ring(radius: float, z: float) -> FloatArray:
+def _ring(radius: float, z: float) -> Doubles:
     angle = 2 * np.pi * np.arange(120) / 120
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(120, z)], axis=-1)
 
 
-def _spoke(angle: float, depth: float, bulge: float) -> FloatArray:
+def _spoke(angle: float, depth: float, bulge: float) -> Doubles:
     radius = np.linspace(0.036, CAGE_M, 24)
     swirl = angle + 0.35 * radius / CAGE_M
     z = depth + bulge * (1 - (radius / CAGE_M) ** 2)

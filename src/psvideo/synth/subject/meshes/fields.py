@@ -8,15 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
 
-def ball(p: FloatArray, centre: ArrayLike, radius: float) -> FloatArray:
+def ball(p: Doubles, centre: ArrayLike, radius: float) -> Doubles:
     """Return the distance to a ball."""
     return np.asarray(_lengths(p - np.asarray(centre)) - radius)
 
 
-def ellipsoid(p: FloatArray, centre: ArrayLike, radii: ArrayLike) -> FloatArray:
+def ellipsoid(p: Doubles, centre: ArrayLike, radii: ArrayLike) -> Doubles:
     """Return the distance to an axis-aligned ellipsoid, exact near its surface."""
     q = (p - np.asarray(centre)) / np.asarray(radii)
     reach = _lengths(q)
@@ -24,7 +24,7 @@ def ellipsoid(p: FloatArray, centre: ArrayLike, radii: ArrayLike) -> FloatArray:
     return np.asarray(reach * (reach - 1.0) / np.maximum(slope, 1e-9))
 
 
-def limb(p: FloatArray, start: ArrayLike, end: ArrayLike, start_radius: float, end_radius: float) -> FloatArray:
+def limb(p: Doubles, start: ArrayLike, end: ArrayLike, start_radius: float, end_radius: float) -> Doubles:
     """Return the distance to a rounded limb whose radius runs from one end to the other."""
     a, ab = np.asarray(start, float), np.asarray(end, float) - np.asarray(start, float)
     share = np.clip((p - a) @ ab / (ab @ ab), 0.0, 1.0)
@@ -32,7 +32,7 @@ def limb(p: FloatArray, start: ArrayLike, end: ArrayLike, start_radius: float, e
     return np.asarray(_lengths(p - a - share[:, None] * ab) - radius)
 
 
-def strand(p: FloatArray, points: Sequence[ArrayLike], radii: Sequence[float], blend: float = 0.0) -> FloatArray:
+def strand(p: Doubles, points: Sequence[ArrayLike], radii: Sequence[float], blend: float = 0.0) -> Doubles:
     """Return the distance to a chain of limbs through points."""
     limbs = [limb(p, points[i], points[i + 1], radii[i], radii[i + 1]) for i in range(len(points) - 1)]
     total = limbs[0]
@@ -41,7 +41,7 @@ def strand(p: FloatArray, points: Sequence[ArrayLike], radii: Sequence[float], b
     return total
 
 
-def rotated(p: FloatArray, centre: ArrayLike, axis: int, degrees: float) -> FloatArray:
+def rotated(p: Doubles, centre: ArrayLike, axis: int, degrees: float) -> Doubles:
     """Return points turned back about a line parallel to an axis, so that what is drawn there appears turned."""
     angle = np.deg2rad(-degrees)
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -52,7 +52,7 @@ def rotated(p: FloatArray, centre: ArrayLike, axis: int, degrees: float) -> Floa
     return np.asarray(turned_q + np.asarray(centre))
 
 
-def union(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
+def union(a: Doubles, b: Doubles, blend: float = 0.0) -> Doubles:
     """Return the union, with a fillet about as wide as ``blend``."""
     if blend <= 0:
         return np.minimum(a, b)
@@ -60,22 +60,22 @@ def union(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
     return np.asarray(np.minimum(a, b) - near**3 * blend / 6.0)
 
 
-def difference(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
+def difference(a: Doubles, b: Doubles, blend: float = 0.0) -> Doubles:
     """Return ``a`` without ``b``, with a rounded edge."""
     return -union(-a, b, blend)
 
 
-def common(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
+def common(a: Doubles, b: Doubles, blend: float = 0.0) -> Doubles:
     """Return what ``a`` and ``b`` share, with a rounded edge."""
     return -union(-a, -b, blend)
 
 
-def mirrored(p: FloatArray) -> FloatArray:
+def mirrored(p: Doubles) -> Doubles:
     """Return points folded onto x >= 0, so that what is drawn on the right appears on both sides."""
     return np.asarray(np.column_stack([np.abs(p[:, 0]), p[:, 1:]]))
 
 
-def _lengths(vectors: FloatArray) -> FloatArray:
+def _lengths(vectors: Doubles) -> Doubles:
     # axis by axis: numpy is slow along a short last axis
     x, y, z = vectors.T
     return np.asarray(np.sqrt(x * x + y * y + z * z))

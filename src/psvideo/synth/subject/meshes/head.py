@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.synth.subject.material import layered_noise
 from psvideo.synth.subject.meshes.fields import (
     ball,
@@ -28,7 +28,7 @@ CELL_M = 0.0019
 EYE = np.array([0.0315, 0.0010, 0.0640])
 GLOBE_M = 0.0135
 
-Detail = Callable[[FloatArray, FloatArray], FloatArray]
+Detail = Callable[[Doubles, Doubles], Doubles]
 
 
 def bust() -> Shape:
@@ -37,7 +37,7 @@ def bust() -> Shape:
     return make_shape(vertices, faces, _paint(mirrored(vertices)))
 
 
-def _paint(m: FloatArray) -> FloatArray:
+def _paint(m: Doubles) -> Doubles:
     """Return the albedo at points of the surface: skin with a little life in it, hair, lips, irises, a dark base."""
     albedo = np.array([0.74, 0.62, 0.52]) * (1.0 + 0.10 * layered_noise(m / 0.03)[:, None])
     cheek = np.exp(-(((m - [0.040, -0.040, 0.065]) / 0.020) ** 2).sum(axis=1))[:, None]
@@ -58,7 +58,7 @@ def _paint(m: FloatArray) -> FloatArray:
     return np.clip(albedo, 0.01, 0.9)
 
 
-def bust_field(p: FloatArray) -> FloatArray:
+def bust_field(p: Doubles) -> Doubles:
     """Return the signed distance to the bust."""
     m = mirrored(p)
     body = _neck(p, m)
@@ -71,8 +71,8 @@ def bust_field(p: FloatArray) -> FloatArray:
 
 
 def _within(
-    body: FloatArray, m: FloatArray, far: tuple[float, float, float], near: tuple[float, float, float], detail: Detail
-) -> FloatArray:
+    body: Doubles, m: Doubles, far: tuple[float, float, float], near: tuple[float, float, float], detail: Detail
+) -> Doubles:
     """Return the body with a detail worked in where folded points lie in a box; elsewhere it is not even computed."""
     low, high = np.minimum(far, near), np.maximum(far, near)
     inside = ((m >= low) & (m <= high)).all(axis=1)
@@ -81,7 +81,7 @@ def _within(
     return worked
 
 
-def _skull(m: FloatArray) -> FloatArray:
+def _skull(m: Doubles) -> Doubles:
     """Cranium, cheeks, jaw and chin."""
     cranium = ellipsoid(m, (0, 0.032, -0.014), (0.0715, 0.083, 0.092))
     forehead = ellipsoid(m, (0, 0.040, 0.022), (0.060, 0.058, 0.063))
@@ -101,7 +101,7 @@ def _skull(m: FloatArray) -> FloatArray:
     return union(head, chin, 0.020)
 
 
-def _face(head: FloatArray, m: FloatArray) -> FloatArray:
+def _face(head: Doubles, m: Doubles) -> Doubles:
     """Brows, eyes, nose and mouth on the head."""
     head = union(head, _brow(m), 0.020)
     socket = ellipsoid(m, (0.0315, 0.0035, 0.0935), (0.0225, 0.0135, 0.0200))
@@ -110,12 +110,12 @@ def _face(head: FloatArray, m: FloatArray) -> FloatArray:
     return _mouth(_nose(head, m), m)
 
 
-def _brow(m: FloatArray) -> FloatArray:
+def _brow(m: Doubles) -> Doubles:
     points = [(0.012, 0.0205, 0.0815), (0.028, 0.0255, 0.0790), (0.048, 0.0180, 0.0610)]
     return strand(m, points, [0.0040, 0.0055, 0.0036], 0.01)
 
 
-def _eye(m: FloatArray) -> FloatArray:
+def _eye(m: Doubles) -> Doubles:
     """Eyeball with lids that leave an almond open."""
     globe = ball(m, EYE, GLOBE_M)
     lids = ball(m, EYE, GLOBE_M + 0.0029)
@@ -129,7 +129,7 @@ def _eye(m: FloatArray) -> FloatArray:
     return difference(eye, crease, 0.003)
 
 
-def _nose(head: FloatArray, m: FloatArray) -> FloatArray:
+def _nose(head: Doubles, m: Doubles) -> Doubles:
     """Bridge, tip, wings and nostrils."""
     points = [(0, 0.018, 0.0805), (0, 0.001, 0.0860), (0, -0.022, 0.0955), (0, -0.032, 0.1005)]
     head = union(head, strand(m, points, [0.0070, 0.0062, 0.0074, 0.0084], 0.01), 0.016)
@@ -141,7 +141,7 @@ def _nose(head: FloatArray, m: FloatArray) -> FloatArray:
     return difference(head, nostril, 0.003)
 
 
-def _mouth(head: FloatArray, m: FloatArray) -> FloatArray:
+def _mouth(head: Doubles, m: Doubles) -> Doubles:
     """Muzzle, lips, the line between them, philtrum and the fold above the chin."""
     head = union(head, ellipsoid(m, (0, -0.067, 0.066), (0.030, 0.022, 0.0235)), 0.020)
     head = union(head, _lips(m), 0.005)
@@ -153,7 +153,7 @@ def _mouth(head: FloatArray, m: FloatArray) -> FloatArray:
     return difference(head, ellipsoid(m, (0, -0.0885, 0.0930), (0.018, 0.0045, 0.0095)), 0.012)
 
 
-def _lips(m: FloatArray) -> FloatArray:
+def _lips(m: Doubles) -> Doubles:
     """Upper and lower lip."""
     upper = strand(
         m,
@@ -170,7 +170,7 @@ def _lips(m: FloatArray) -> FloatArray:
     return union(upper, lower)
 
 
-def _ear(m: FloatArray) -> FloatArray:
+def _ear(m: Doubles) -> Doubles:
     """Shell, rim and lobe."""
     q = rotated(m, (0.064, -0.010, 0.005), 1, 24.0)
     q = rotated(q, (0.064, -0.010, -0.010), 0, -10.0)
@@ -192,7 +192,7 @@ def _ear(m: FloatArray) -> FloatArray:
     return union(difference(shell, bowl, 0.004), rim, 0.004)
 
 
-def _hair(m: FloatArray) -> FloatArray:
+def _hair(m: Doubles) -> Doubles:
     """A cap of waved locks, combed back from a hairline."""
     cap = ellipsoid(m, (0, 0.034, -0.021), (0.0785, 0.0895, 0.0955))
     nape = ellipsoid(m, (0, -0.022, -0.058), (0.056, 0.045, 0.048))
@@ -207,7 +207,7 @@ def _hair(m: FloatArray) -> FloatArray:
     return common(union(front, nape, 0.03) + waves, line - m[:, 1], 0.010)
 
 
-def _neck(p: FloatArray, m: FloatArray) -> FloatArray:
+def _neck(p: Doubles, m: Doubles) -> Doubles:
     """Column, the muscles from ear to breastbone, and the throat."""
     column = limb(p, (0, -0.055, -0.020), (0, -0.190, -0.032), 0.050, 0.056)
     muscle = strand(
@@ -217,7 +217,7 @@ def _neck(p: FloatArray, m: FloatArray) -> FloatArray:
     return union(union(column, muscle, 0.022), throat, 0.020)
 
 
-def _shoulders(m: FloatArray) -> FloatArray:
+def _shoulders(m: Doubles) -> Doubles:
     """Chest and shoulders, cut off like an antique bust."""
     chest = ellipsoid(m, (0, -0.275, -0.030), (0.150, 0.110, 0.080))
     shoulder = ellipsoid(m, (0.135, -0.235, -0.040), (0.058, 0.060, 0.055))
@@ -234,7 +234,7 @@ def _shoulders(m: FloatArray) -> FloatArray:
     return common(body, m[:, 0] - 0.172, 0.014)
 
 
-def _base(m: FloatArray) -> FloatArray:
+def _base(m: Doubles) -> Doubles:
     """A turned foot: a waisted column on a round plinth."""
     radius = np.hypot(m[:, 0], m[:, 2] + 0.024)
     y = m[:, 1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 from psvideo.synth.subject.material import layered_noise
 from psvideo.synth.subject.meshes.basic import Paint, box, grid_faces, lathe, painted, tube
 from psvideo.synth.subject.shape import Shape, make_shape, merged
@@ -38,7 +38,7 @@ def vase() -> Shape:
     return make_shape(shape.vertices, shape.faces, _vase_paint(shape.vertices))
 
 
-def _vase_paint(v: FloatArray) -> FloatArray:
+def _vase_paint(v: Doubles) -> Doubles:
     """White glaze with blue rings and a frieze of diamonds round the belly."""
     albedo = np.tile([0.72, 0.73, 0.70], (len(v), 1)) * (1 + 0.05 * layered_noise(v / 0.02)[:, None])
     y, around = v[:, 1], np.arctan2(v[:, 0], v[:, 2]) * 16 / (2 * np.pi)

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.camera import FloatArray
+from psvideo.model.arrays import Doubles
 
-Field = Callable[[FloatArray], FloatArray]
+Field = Callable[[Doubles], Doubles]
 """A signed distance, negative inside: points (point, 3) to (point,)."""
 
 COARSE = 4
@@ -21,9 +21,7 @@ POINTS = 1 << 15
 """This many points are asked for at a time: what a field of many parts holds of them stays in the processor's cache."""
 
 
-def extract_surface(
-    field: Field, low: FloatArray, high: FloatArray, cell_m: float
-) -> tuple[FloatArray, NDArray[np.int32]]:
+def extract_surface(field: Field, low: Doubles, high: Doubles, cell_m: float) -> tuple[Doubles, NDArray[np.int32]]:
     """Return vertices (vertex, 3) and triangles (face, 3) of the surface inside a box, at cells of ``cell_m``.
 
     The surface must stay inside the box. Features thinner than a coarse cell are found only where the field's values
@@ -38,12 +36,12 @@ def extract_surface(
     return _pulled(partial(_by_parts, field), points, cell_m), faces
 
 
-def _by_parts(field: Field, points: FloatArray) -> FloatArray:
+def _by_parts(field: Field, points: Doubles) -> Doubles:
     """Return the field at points, asked for POINTS at a time."""
     return np.concatenate([field(points[first : first + POINTS]) for first in range(0, len(points), POINTS)])
 
 
-def _sampled(field: Field, low: FloatArray, counts: NDArray[np.integer], cell_m: float) -> NDArray[np.float32]:
+def _sampled(field: Field, low: Doubles, counts: NDArray[np.integer], cell_m: float) -> NDArray[np.float32]:
     """Return the field at the fine grid's nodes; far from the surface, the coarse values stand for it."""
     step = COARSE * cell_m
     coarse_nodes = np.stack(np.meshgrid(*(np.arange(n + 1) for n in counts), indexing="ij"), axis=-1)
@@ -56,7 +54,7 @@ def _sampled(field: Field, low: FloatArray, counts: NDArray[np.integer], cell_m:
     return fine
 
 
-def _cell_vertices(values: NDArray[np.float32], inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], FloatArray]:
+def _cell_vertices(values: NDArray[np.float32], inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Doubles]:
     """Return each crossed cell's vertex number (cell grid, -1 = none) and the vertices in grid units."""
     shape = np.array(values.shape) - 1
     count = np.zeros(shape, np.int8)
@@ -100,7 +98,7 @@ def _faces(inside: NDArray[np.bool_], number: NDArray[np.intp]) -> NDArray[np.in
     return np.concatenate(triangles).astype(np.int32)
 
 
-def _pulled(field: Field, points: FloatArray, cell_m: float) -> FloatArray:
+def _pulled(field: Field, points: Doubles, cell_m: float) -> Doubles:
     """Move points onto the surface along the field's gradient, at most half a cell."""
     reach = 0.25 * cell_m
     value = field(points)
