@@ -102,7 +102,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ),
         (
             "a strobed clip of the ball, outline given by hand",
-            "psvideo calibrate matte-sphere clip/ --circle 80,60,40 -o rig.toml",
+            "psvideo calibrate matte-sphere clip/ --circle 80,59,50 -o rig.toml",
         ),
     ),
     "calibrate flat-field": (

@@ -164,42 +164,49 @@ def _direction(readout_s: float) -> str:
 
 def _exposure(plan: Plan, found: ClipFit) -> str:
     for frames_each in GAIN_FRAMES:
-        gain, share = frame_gains(plan, found, frames_each=frames_each)
-        low, high = np.percentile(gain, [2, 98])
-        if share > GAIN_EXPLAINS and 0 < low < high / (1 + GAIN_RANGE):
+        gains, share = frame_gains(plan, found, frames_each=frames_each)
+        least = min(_range(one) for one in gains)
+        if share > GAIN_EXPLAINS and least > GAIN_RANGE:
             return (
-                f"Whole frames grow brighter and darker by {100 * (high / low - 1):.0f} %: the camera seems to have "
+                f"Whole frames grow brighter and darker by {100 * _range(gains[0]):.0f} %: the camera seems to have "
                 "set its exposure or gain by itself. Plates of different moments cannot be compared; film with "
                 "everything fixed."
             )
     return ""
 
 
-def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[Doubles, float]:
-    """Return every frame's gain (frame,) of its flashes, against the whole clip's brightnesses, and what gains explain
-    of the rest. The light of the room has a gain of its own: it changes where a camera does not."""
+def _range(gain: Doubles) -> float:
+    """Return by which share the larger gains exceed the smaller ones; 0 where some are none."""
+    low, high = np.percentile(gain, [2, 98])
+    return float(high / low - 1) if low > 0 else 0.0
+
+
+def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[tuple[Doubles, Doubles], float]:
+    """Return every frame's gain (frame,) against the whole clip's brightnesses, and of its flashes alone; and what the
+    first explains of the rest. The light of the room may change where the camera's gain and the flashes do not."""
     rows = replace(found.rows, doubt=None)
     beat = replace(found.fit.beat, beat_hz=())
     light = brightnesses(plan, rows.one_window(), beat)
     expected = predictions(plan, rows, beat, light)
     trust = found.fit.weight / found.fit.weight.max(axis=0)
+    change = rows.value - expected
     room = np.broadcast_to(light[:, 0], expected.shape)
+
+    def around(one: Doubles, other: Doubles) -> Doubles:
+        sums, width = (trust * one * other).sum(axis=1), min(frames_each, len(rows.value))
+        return np.convolve(np.pad(sums, width // 2, mode="edge"), np.ones(width), mode="valid")[: len(sums)]
+
+    power = around(expected, expected)
+    lit = power > DIM * np.median(power)
+    gain = 1 + np.where(lit, around(expected, change) / np.maximum(power, TINY), 0.0)
     parts = (expected - room, room)
-
-    def around(picture: Doubles) -> Doubles:
-        sums, width = (trust * picture).sum(axis=1), min(frames_each, len(rows.value))
-        padded = np.pad(sums, width // 2, mode="edge")
-        return np.convolve(padded, np.ones(width), mode="valid")[: len(sums)]
-
-    hessian = np.array([[around(one * other) for one in parts] for other in parts])
-    change = np.array([around(one * (rows.value - expected)) for one in parts])
-    hessian += TIED * hessian.trace() * np.array([[1.0, -1.0], [-1.0, 1.0]])[..., None]
-    more = np.linalg.solve(np.moveaxis(hessian, -1, 0) + TINY * np.eye(2), change.T[..., None])[..., 0]
-    lit = hessian[0, 0] > DIM * np.median(hessian[0, 0])
-    more[~lit] = 0.0
-    before = float((trust * (rows.value - expected) ** 2).sum())
-    left = rows.value - expected - sum(one * part for one, part in zip(more.T[..., None], parts, strict=True))
-    return 1 + more[:, 0], 1 - float((trust * left**2).sum()) / max(before, 1e-30)
+    hessian = np.moveaxis(np.array([[around(one, other) for one in parts] for other in parts]), -1, 0)
+    tied = TIED * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    scores = np.stack([around(one, change) for one in parts], axis=-1)
+    alone = np.linalg.solve(hessian + tied + TINY * np.eye(2), scores[..., None])[:, 0, 0]
+    before = float((trust * change**2).sum())
+    after = float((trust * (rows.value - gain[:, None] * expected) ** 2).sum())
+    return (gain, 1 + np.where(lit, alone, 0.0)), 1 - after / max(before, TINY)
 
 
 def _soft(found: ClipFit) -> str:
