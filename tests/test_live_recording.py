@@ -69,6 +69,20 @@ def test_a_disk_that_fills_leaves_what_was_recorded_whole(
     assert "exists already" in capsys.readouterr().err
 
 
+def test_a_disk_that_takes_a_part_of_a_frame_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """numpy counts what it wrote, and names no error of the system's."""
+    record = Recording(folder=tmp_path / "rec", most_bytes=64, waits=True)
+    (tmp_path / "rec" / "frames").mkdir(parents=True)
+
+    def cut(path: Path, codes: np.ndarray) -> None:
+        raise OSError("64 requested and 16 written")
+
+    monkeypatch.setattr(recording, "write_codes", cut)
+    record.take(LiveFrame(index=0, coded=Coded(codes=np.zeros((8, 8), np.uint8)), came_s=0.0))
+    record.write()
+    assert "(the disk takes no more). Make room on the disk" in record.ended
+
+
 def test_a_writer_that_fails_in_any_way_ends_the_recording_and_nobody_waits_for_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -110,6 +110,12 @@ def test_only_the_results_of_the_frames_that_are_used_need_a_mask(tmp_path: Path
     assert len(report["instants"]) == 1
 
 
+def test_a_mask_of_0_and_1_is_called_black_with_what_white_is(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.ones((8, 8), np.uint8))
+    with pytest.raises(ps.PsvideoError, match=r"black everywhere \(its brightest pixel is 1, and white is 255\)"):
+        ps.read_mask(tmp_path / "a.png")
+
+
 def test_two_masks_of_one_number_are_refused(tmp_path: Path) -> None:
     folder = masks(tmp_path / "a", [1, 2])
     shutil.copyfile(folder / "mask.0001.png", folder / "mask.1.png")

@@ -72,5 +72,7 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
         )
     mask: NDArray[np.bool_] = brightest > 0.5 * white
     if not mask.any():
-        raise PsvideoError(f"{path}: the mask is black everywhere; paint white where normals are wanted.")
+        most = float(brightest.max())
+        dim = f" (its brightest pixel is {most:.6g}, and white is {white:.6g})" if most > 0 else ""
+        raise PsvideoError(f"{path}: the mask is black everywhere{dim}; paint white where normals are wanted.")
     return mask

@@ -30,6 +30,8 @@ MOST_WAITING_BYTES = 256_000_000
 """Codes that may wait for the disk: more than a second of most cameras."""
 FIRST_NUMBER = 1
 """What the first recorded frame's file is numbered."""
+NO_ROOM = "the disk takes no more"
+"""numpy says in its own words, and without the system's, that fewer bytes were written than it had."""
 
 
 @dataclass(kw_only=True)
@@ -105,12 +107,12 @@ class Recording:
             self._changed.notify_all()
 
     def _give_up(self, index: int, fault: Exception) -> None:
-        why = fault.strerror if isinstance(fault, OSError) else None
+        why = (fault.strerror or NO_ROOM) if isinstance(fault, OSError) else str(fault)
         (self.folder / FRAMES / f"live.{index + FIRST_NUMBER:06d}.tif").unlink(missing_ok=True)
         with self._changed:
             self.ended = (
                 f"Recording ended after {self.written} frames, which are whole: the next could not be written "
-                f"({why or fault}). Make room on the disk, and record again."
+                f"({why}). Make room on the disk, and record again."
             )
             self._queue.clear()
             self._changed.notify_all()
