@@ -415,20 +415,16 @@ def strengths_by(rig: Path) -> list[float]:
     return [found[name] for name in CARD if name in found]
 
 
+def flat_field_words(folder: Path, out: Path) -> list[str]:
+    return ["calibrate", "flat-field", str(folder), "--rig", str(out / "card.toml"), "-o", str(out / "r.toml")]
+
+
 def test_a_white_card_that_fills_a_part_of_the_picture_is_named_with_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The median of the picture is the wall's, and was taken for the card's: strengths ten times too small."""
     folder = card_pictures(tmp_path / "card", part=(40, 20, 100, 80))
-    words = [
-        "calibrate",
-        "flat-field",
-        str(folder),
-        "--rig",
-        str(tmp_path / "card.toml"),
-        "-o",
-        str(tmp_path / "r.toml"),
-    ]
+    words = flat_field_words(folder, tmp_path)
     assert main(words) == 1
     said = capsys.readouterr().err
     assert said.startswith(f"psvideo: {folder}: A part of the picture, about ")
@@ -447,15 +443,7 @@ def test_grain_is_no_falloff_and_a_light_without_a_picture_is_named(
 ) -> None:
     folder = card_pictures(tmp_path / "card", part=(0, 0, 160, 120), grain=0.05)
     (folder / "low.exr").unlink()
-    words = [
-        "calibrate",
-        "flat-field",
-        str(folder),
-        "--rig",
-        str(tmp_path / "card.toml"),
-        "-o",
-        str(tmp_path / "r.toml"),
-    ]
+    words = flat_field_words(folder, tmp_path)
     assert main(words) == 0
     said = capsys.readouterr().err
     assert "not evenly lit" not in said

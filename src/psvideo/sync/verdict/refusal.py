@@ -88,8 +88,8 @@ def in_step_with_frames(plan: Plan) -> str:
     return (
         f"the strobe keeps step with the camera: the same {counted(frames, 'picture')} come again and again, and a row "
         f"has as many brightnesses ({counted(len(plan.lit_slots), 'light')} and what else shines), so that any flash "
-        "times would explain them. Film for so long that the clocks drift apart by a flash, or plan another dark time "
-        f"(dark_s = {plan.dark_s + 0.1 * plan.camera.frame_period_s:.4g} under [strobe])."
+        "times would explain them. Film long enough for the clocks to drift apart by a flash, or plan another dark "
+        f"time (dark_s = {plan.dark_s + 0.1 * plan.camera.frame_period_s:.4g} under [strobe])."
     )
 
 
