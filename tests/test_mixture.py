@@ -70,7 +70,7 @@ def in_numpy(picture: Mixture) -> tuple[np.ndarray, np.ndarray]:
     total = sum(takes[by_row] * light for takes, light in zip(picture.coefficients, lights, strict=True))
     clipped = np.any(
         [
-            (light >= np.float32(SATURATED)) & (takes > 0.02)[by_row]
+            (light >= np.float32(SATURATED)) & (takes > 0.02 * picture.coefficients.max(axis=0))[by_row]
             for takes, light in zip(picture.coefficients, lights, strict=True)
         ],
         axis=0,
@@ -92,6 +92,14 @@ def test_the_kernel_does_what_numpy_does_to_rounding(name: str) -> None:
     assert (image[clipped] == 1.0).all()
     assert (picture.clipped() == clipped).all()
     assert not image[7].any(), "no frame saw this row"
+
+
+@pytest.mark.parametrize("name", ["8 bits", "12 bits of 16", "curve", "mosaic"])
+def test_a_clipped_sample_counts_as_much_in_a_plate_out_of_a_hundred_flashes(name: str) -> None:
+    one = shot(name)
+    small = replace(one, coefficients=0.01 * one.coefficients)
+    assert (small.clipped() == one.clipped()).all()
+    assert (small.image()[one.clipped()] == 1.0).all()
 
 
 @pytest.mark.parametrize("name", TONES)

@@ -24,7 +24,8 @@ from psvideo.plates.mixing.mixture_arrays import MixtureArrays, lent_mix, level_
 NOTHING, WHOLE, CLIPPED = range(3)
 
 COUNTS = np.float32(0.02)
-"""A clipped sample clips the plate where this much of it counts; less is a neighbour's tail that is taken off."""
+"""A clipped sample clips the plate where its coefficient is more than this much of the row's largest; less is a
+neighbour's tail that is taken off. A ratio, since a plate out of a hundred flashes has small coefficients only."""
 
 
 @FUSED.kept
@@ -60,7 +61,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
 
     Returned is NOTHING where no frame saw it, and it is 0; CLIPPED where a sample is clipped; else WHOLE.
     """
-    begun, holds_clipped = False, False
+    begun, holds_clipped, counts_from = False, False, _counts_from(mix, row)
     level, place = _next_level(mix, 0, row), row % mix.zero.shape[1]
     for frame in range(mix.frames.shape[0]):
         factor = mix.coefficients[frame, row]
@@ -75,7 +76,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
         elif mix.table.size:
             clipped = add_by_table(codes, mix.table, zero, scale, limit, out, begun)
         else:
-            clipped = not holds_clipped and abs(factor) > COUNTS and some_reach(codes, limit, mix.most)
+            clipped = not holds_clipped and abs(factor) > counts_from and some_reach(codes, limit, mix.most)
             if begun:
                 add_linear(codes, zero, scale, mix.most, out)
             elif level < mix.levels.shape[0]:
@@ -84,7 +85,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
                 level = _next_level(mix, level + 1, row)
             else:
                 begin_linear(codes, zero, scale, mix.most, out)
-        holds_clipped = holds_clipped or (clipped and abs(factor) > COUNTS)
+        holds_clipped = holds_clipped or (clipped and abs(factor) > counts_from)
         begun = True
     if not begun:
         out[:] = np.float32(0)
@@ -94,7 +95,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
         take_off(level_row(mix, level, row), share, least, out)
         level = _next_level(mix, level + 1, row)
     if holds_clipped:
-        _mark_clipped(mix, row, out)
+        _mark_clipped(mix, row, counts_from, out)
     return CLIPPED if holds_clipped else WHOLE
 
 
@@ -115,10 +116,19 @@ def _next_level(mix: MixtureArrays, first: int, row: int) -> int:
 
 
 @FUSED.inlined
-def _mark_clipped(mix: MixtureArrays, row: int, out: Floats) -> None:
+def _counts_from(mix: MixtureArrays, row: int) -> np.float32:
+    """Above which coefficient a frame's clipped sample clips the row."""
+    largest = np.float32(0)
+    for frame in range(mix.frames.shape[0]):
+        largest = max(largest, abs(mix.coefficients[frame, row]))
+    return COUNTS * largest
+
+
+@FUSED.inlined
+def _mark_clipped(mix: MixtureArrays, row: int, counts_from: np.float32, out: Floats) -> None:
     rows, cols = mix.zero.shape[1:]
     for frame in range(mix.frames.shape[0]):
-        if abs(mix.coefficients[frame, row]) > COUNTS:
+        if abs(mix.coefficients[frame, row]) > counts_from:
             codes = row_of(mix, frame, row)
             for sample in range(mix.samples):
                 col = sample % cols

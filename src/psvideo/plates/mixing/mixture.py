@@ -132,8 +132,9 @@ class Mixture:
     def clipped(self) -> NDArray[np.bool_]:
         """Return where any sample that counts was clipped, of the picture's shape."""
         clipped = np.zeros(self.shape, np.bool_)
+        counts_from = COUNTS * np.abs(self.coefficients).max(axis=0)  # (row,)
         for frame, share in zip(self.frames, self.coefficients, strict=True):
-            counts = np.abs(share) > COUNTS
+            counts = np.abs(share) > counts_from
             clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
         return clipped
 
