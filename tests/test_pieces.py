@@ -37,7 +37,7 @@ from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
-from psvideo.runs.instants import pieces
+from psvideo.runs.instants import piece_frames
 from psvideo.runs.instants.job import Found
 from psvideo.runs.instants.piece_notes import noted, write_notes
 from psvideo.runs.instants.pieces import cut, piece_named
@@ -186,7 +186,7 @@ def same_in_pieces(clip: Path, folder: Path, words: tuple[str, ...], **options: 
 
 
 def test_a_run_in_pieces_gives_the_bytes_of_one_at_one_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (light_history, pieces, steady):  # else half a hundred rounds were needed
+    for module in (light_history, piece_frames, steady):  # else half a hundred rounds were needed
         monkeypatch.setattr(module, "POOLED_ROUNDS", 4)
     clip = filmed(tmp_path, frames=100, speed_px=0.2)
     options: dict[str, Any] = {"aov": ["beauty"], "with_ambient": True, "denoise": 2, "preview": ()}
