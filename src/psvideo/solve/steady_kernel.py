@@ -1,4 +1,11 @@
-"""Compiled loops that pool results over rounds at rest: votes on a pixel's class, and means of what is not trusted."""
+"""Compiled loops that pool results over rounds at rest: votes on a pixel's class, and means of what is not trusted.
+
+A round always decides by as many rounds as a block has: by those of its own block so far, and for the rest by the share
+that the block before had. Blocks of 16, a pixel that was trusted in 12 rounds of the block before: in the 4th round of
+this one, and trusted in 1 of them, it has (1 + 12 * 12 / 16) / 16 = 0.63 of the votes, and is trusted; in the 10th
+round, trusted in 3, (3 + 6 * 12 / 16) / 16 = 0.47, and is not. So a class that changes, changes once a block at most.
+Values are averaged alike, over the rounds in which the pixel was not trusted.
+"""
 
 from typing import Any, NamedTuple
 

@@ -2,6 +2,17 @@
 
 Plates are most of a run's memory: one is released as soon as no instant, of those that wait and those to come, can be
 made from it, and packed once it was found to move. Sketches are a fiftieth of that, and stay a round longer.
+
+Three lights a, b, c in three rounds, and the instant ``*`` of the second one, at its middle:
+
+    a1   b1   c1      a2   b2   c2      a3   b3   c3
+                           *
+    a: from a2 and a3        b: b2, as it is        c: from c1 and c2
+
+So c is made once c2 is there, and a waits for a3. It need not wait where nothing moves: c1 and c2 are alike, so nothing
+moved until c2, and a2 serves as it is (``_stood``). Where c1 is missing, c would wait for c3: not where a2 and a3 are
+alike (``_rests``). c2 is held for the instant of round 3, until that round's first lights show that nothing moved
+since (``_stands_on``).
 """
 
 from collections import deque
