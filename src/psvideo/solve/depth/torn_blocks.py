@@ -4,6 +4,14 @@ A coarser grid whose pixels lie on both sides of a jump would tie the sides toge
 would undo what the one before did there. So pixels that do not hang together with most of their block are *moved*: each
 to the block beside it on whose pixel it depends most. What hangs together with nothing near is left out of the
 coarser grid; sweeps bring it along. Moved pixels are few, and are listed as (colour, row, k), see ``checkerboard.py``.
+
+The four pixels of a block, where ``row`` is odd and the block is at ((row - 1) // 2, k - 1) among the blocks:
+
+    a = [0, row, k]        b = [1, row, k]
+    c = [1, row + 1, k]    d = [0, row + 1, k]
+
+West of a is b of the block with k - 1, and north of it c of the block above. A block's own place on the coarser board
+is [(block_row + block_col) % 2, block_row + 1, block_col // 2 + 1].
 """
 
 from typing import Any
