@@ -19,8 +19,8 @@ def with_darks_ahead(
     """Return a clip's plates, and the dark slots among them ahead of the others, which wait meanwhile: those after the
     flash with the index ``beyond``.
 
-    Both read one stream, and whoever asks first pulls for the other, too. Flashes a, b and dark slots D, when ``subtract``
-    has given a1 and wants the dark slot after b1:
+    Both read one stream, and whoever asks first pulls for the other, too. Flashes a, b and dark slots D, when
+    ``subtract`` has given a1 and wants the dark slot after b1:
 
         pulled:   a1 b1 a2 b2 D2    (the second: D2 was wanted, and b1 a2 b2 came with it)
         coming:   a1, next is b1    (``waiting``: b1 a2 b2 D2; the dark slot passes once more, in its place)
