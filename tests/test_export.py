@@ -1,6 +1,7 @@
 """What is delivered: files that read back as they were meant, whole or not at all."""
 
 import contextlib
+import errno
 import resource
 import subprocess
 import sys
@@ -29,6 +30,7 @@ from psvideo.export.sequences.tags import Tags, advanced
 from psvideo.export.space import Space, choose_space, placed
 from psvideo.export.usd.pose import read_pose
 from psvideo.formats.exr_files import Crop, write_exr
+from psvideo.formats.whole_files import whole_file
 from psvideo.formats.whole_folders import whole_folder
 from psvideo.model.choices import Compression
 from psvideo.model.surface import Surface
@@ -280,7 +282,7 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
         pass
     with whole_folder(out, mark="timing.json", force=True) as folder:
         (folder / "new.txt").write_text("y")
-    assert [path.name for path in out.iterdir()] == ["new.txt"]
+    assert sorted(path.name for path in out.iterdir()) == [".written", "new.txt"]
     with whole_folder(tmp_path / "other", mark="timing.json", resume=True) as folder:
         assert not any(folder.iterdir()), "where nothing was begun, it begins"
 
@@ -294,7 +296,7 @@ def test_a_folder_is_resumed_only_with_the_settings_it_was_begun_with(tmp_path: 
         pass
     with whole_folder(out, mark="a", resume=True, settings="one") as folder:
         (folder / "a").write_text("x")
-    assert sorted(path.name for path in out.iterdir()) == [".settings", "a"]
+    assert sorted(path.name for path in out.iterdir()) == [".settings", ".written", "a"]
     with pytest.raises(AllDoneError, match="all done"), whole_folder(out, mark="a", resume=True, settings="one"):
         pass
     with pytest.raises(UsageError, match="exists"), whole_folder(out, mark="a", resume=True, settings="two"):
@@ -319,11 +321,79 @@ def test_what_a_run_that_was_killed_had_moved_out_of_the_way_is_removed_by_the_n
 
 def test_a_failed_run_leaves_the_output_that_it_was_to_replace(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    out.mkdir()
-    (out / "timing.json").write_text("keep me")
+    with whole_folder(out, mark="timing.json") as folder:
+        (folder / "timing.json").write_text("keep me")
     with pytest.raises(RuntimeError), whole_folder(out, mark="timing.json", force=True):
         raise RuntimeError
     assert (out / "timing.json").read_text() == "keep me"
+
+
+def written_before(out: Path) -> None:
+    with whole_folder(out, mark="timing.json") as folder:
+        (folder / "normals").mkdir()
+        (folder / "normals" / "a.1001.exr").write_text("x")
+        (folder / "timing.json").write_text("x")
+
+
+@pytest.mark.parametrize("mine", ["comp_v2.nk", "renders/final.exr", "normals/a.1001.retouched.exr"])
+def test_force_removes_no_file_that_a_run_did_not_write(mine: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    written_before(out)
+    (out / mine).parent.mkdir(exist_ok=True)
+    (out / mine).write_text("a day's work")
+    (out / ".DS_Store").write_text("a computer's")
+    with pytest.raises(UsageError, match=f"{mine}.*would be gone"), whole_folder(out, mark="timing.json", force=True):
+        pass
+    assert (out / mine).read_text() == "a day's work"
+    (out / mine).unlink()
+    with whole_folder(out, mark="timing.json", force=True) as folder:
+        (folder / "timing.json").write_text("new")
+    assert sorted(path.name for path in out.iterdir()) == [".written", "timing.json"]
+
+
+def test_a_folder_of_ones_own_that_holds_a_timing_file_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "day1" / "clip").mkdir(parents=True)
+    for name in ("timing.json", "notes.txt", "clip/plan.toml"):
+        (tmp_path / "day1" / name).write_text("x")
+    with (
+        pytest.raises(UsageError, match="cannot be told"),
+        whole_folder(tmp_path / "day1", mark="timing.json", force=True),
+    ):
+        pass
+    (tmp_path / "day1" / ".written").write_text("{")
+    with (
+        pytest.raises(UsageError, match="no list of file names"),
+        whole_folder(tmp_path / "day1", mark="timing.json", force=True),
+    ):
+        pass
+    assert (tmp_path / "day1" / "clip" / "plan.toml").is_file()
+
+
+def test_what_was_saved_into_an_output_while_it_was_made_anew_stays_and_the_run_waits_beside_it(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    written_before(out)
+
+    def make_anew() -> None:
+        with whole_folder(out, mark="timing.json", force=True, settings="one") as folder:
+            (folder / "timing.json").write_text("new")
+            (out / "comp.nk").write_text("saved meanwhile")
+
+    with pytest.raises(PsvideoError, match=r"comp\.nk.*waits beside it"):
+        make_anew()
+    (out / "comp.nk").rename(tmp_path / "comp.nk")
+    with whole_folder(out, mark="timing.json", force=True, resume=True, settings="one"):
+        pass
+    assert (out / "timing.json").read_text() == "new"
+
+
+@pytest.mark.parametrize(("settings", "said"), [("one", "what is finished is kept"), ("", "run the command again.$")])
+def test_a_full_disk_s_advice_does_not_cost_what_is_finished(settings: str, said: str, tmp_path: Path) -> None:
+    def fill() -> None:
+        with whole_folder(tmp_path / "out", mark="a", settings=settings) as folder, whole_file(folder / "a"):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(PsvideoError, match=said):
+        fill()
 
 
 def test_a_fault_in_a_writing_thread_reaches_the_run() -> None:

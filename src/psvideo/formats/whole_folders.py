@@ -5,6 +5,7 @@ the run was given is noted in both, so that a run with other inputs neither goes
 """
 
 import contextlib
+import errno
 import os
 import shutil
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.plan_toml import PLAN_FILE
 from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.formats.written_files import note_written, refuse_others
 
 if sys.platform != "win32":
     import fcntl
@@ -23,6 +25,8 @@ SETTINGS = ".settings"
 UNFINISHED = ".*.partial*"
 """Files that a run was writing when it was killed (``whole_files``); libraries that know kinds of files by their
 endings add one."""
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""What systems say of a disk, or of somebody's share of it, that is full."""
 
 
 @contextlib.contextmanager
@@ -40,7 +44,7 @@ def whole_folder(
     refuse_folder(path, mark=mark, force=force, resume=resume, settings=settings)
     path = path.resolve()
     beside = _beside(path)
-    with _said_where(path):
+    with _said_where(path, resumable=bool(settings)):
         beside.mkdir(parents=True, exist_ok=True)
         with _held(beside, path):
             for left in [*(beside.rglob(UNFINISHED) if resume else beside.iterdir())]:
@@ -51,6 +55,9 @@ def whole_folder(
                 write_text(beside / SETTINGS, settings)
             with _still_there(beside, path, settings):
                 yield beside
+            _refuse_what_came(path, resumable=bool(settings))
+            if mark != PLAN_FILE:  # footage is never replaced, and a full disk costs none of it
+                note_written(beside)
             _replace(beside, path)
 
 
@@ -63,7 +70,7 @@ def begun_folder(path: Path, *, mark: str, force: bool = False, settings: str = 
     refuse_folder(path, mark=mark, force=force, resume=True, settings=settings)
     path = path.resolve()
     beside = _beside(path)
-    with _said_where(path):
+    with _said_where(path, resumable=bool(settings)):
         beside.mkdir(parents=True, exist_ok=True)
         with _held(beside, path, shared=True):
             if _noted(beside) != settings:
@@ -103,15 +110,21 @@ def _still_there(beside: Path, path: Path, settings: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _said_where(path: Path) -> Iterator[None]:
-    """Make of a folder that cannot be written a PsvideoError that names it."""
+def _said_where(path: Path, *, resumable: bool = False) -> Iterator[None]:
+    """Make of a folder that cannot be written a PsvideoError that names it, and says of a run that may be resumed how
+    not to lose what is finished."""
+    kept = " Give `resume` with it: what is finished is kept, and a run without begins anew." if resumable else ""
     try:
         yield
     except OSError as fault:
         raise PsvideoError(
             f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
-            "check the folder's permissions, then run the command again."
+            f"check the folder's permissions, then run the command again.{kept}"
         ) from fault
+    except PsvideoError as fault:
+        if not (kept and isinstance(fault.__cause__, OSError) and fault.__cause__.errno in FULL):
+            raise
+        raise PsvideoError(f"{fault}{kept}") from fault.__cause__
 
 
 @contextlib.contextmanager
@@ -145,7 +158,8 @@ def _remove(path: Path) -> None:
 def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, settings: str = "") -> None:
     """Raise UsageError where an output folder exists and may not be replaced, or a stopped run not be resumed.
 
-    ``force`` replaces only what a run like this wrote: a folder that holds ``mark`` and no footage, or nothing at all.
+    ``force`` replaces only what a run like this wrote: a folder that holds ``mark`` and no footage, and no file beside
+    those that the run noted; or nothing at all.
     ``resume`` goes on with a stopped run of the same ``settings``; where there is none, and the folder was finished
     with these and is not to be replaced, AllDoneError is raised.
     """
@@ -171,6 +185,7 @@ def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, s
             f"{path}: holds no {mark}, so it is nothing that this command wrote, and is not replaced, not even with "
             "`force`. Name another output."
         )
+    refuse_others(path)
 
 
 def _beside(path: Path) -> Path:
@@ -192,6 +207,15 @@ def _refuse_other_settings(path: Path, settings: str) -> None:
             f"{path}: the run that was stopped here had other settings, footage, plan, rig or timing, and mixing both "
             "would spoil the sequence. Give the same ones again, or leave `resume` out to start again."
         )
+
+
+def _refuse_what_came(path: Path, *, resumable: bool) -> None:
+    """Raise PsvideoError where somebody saved a file meanwhile into the folder that is to be replaced."""
+    try:
+        refuse_others(path)
+    except UsageError as fault:
+        waits = " What was made now waits beside it: `resume` with `force` puts it in its place." if resumable else ""
+        raise PsvideoError(f"{fault}{waits}") from fault
 
 
 def _old_name(path: Path, process: str) -> str:
