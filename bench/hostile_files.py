@@ -59,7 +59,8 @@ def _filmed(folder: Path, kind: str, camera: str) -> None:
     scene, clip = folder / "scene.toml", folder / "clip"
     scene.write_text(SCENE.format(kind=kind, camera=camera), encoding="utf-8")
     shoot(scene, clip)
-    frame = next(path for path in sorted(clip.rglob("*")) if path.suffix not in (".toml", ".json") and path.is_file())
+    files = (path for path in sorted(clip.rglob("*")) if path.is_file() and not path.name.startswith("."))
+    frame = next(path for path in files if path.suffix not in (".toml", ".json"))
     frame.rename(folder / f"{kind}{frame.suffix}")
     for name in ("plan.toml", "rig.toml"):
         (clip / name).rename(folder / name)

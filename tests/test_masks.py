@@ -7,7 +7,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
+import tifffile
 from numpy.typing import NDArray
 from PIL import ExifTags, Image, ImageOps
 
@@ -195,3 +197,54 @@ def test_a_mask_is_turned_upright_as_its_own_file_says(tmp_path: Path, ending: s
     upright = np.asarray(ImageOps.exif_transpose(Image.open(tmp_path / "reference.png"))) > 127
     assert np.array_equal(ps.read_mask(file), upright)
     ps.read_mask(file, width_px=upright.shape[1], height_px=upright.shape[0])
+
+
+def cut_out() -> NDArray[np.bool_]:
+    y, x = np.mgrid[:SIZE, :SIZE]
+    return np.asarray((x - 30) ** 2 + (y - 24) ** 2 < 200)
+
+
+def painted(path: Path, colour: NDArray[np.uint8], alpha: NDArray[np.bool_]) -> Path:
+    planes = [*(colour[..., None] * np.ones(3, np.uint8)).transpose(2, 0, 1), np.uint8(255) * alpha]
+    if path.suffix == ".exr":
+        channels = {name: (plane / 255).astype(np.float16) for name, plane in zip("RGBA", planes, strict=True)}
+        OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(path))
+    elif path.stem == "planar":
+        tifffile.imwrite(
+            path, np.stack(planes), photometric="rgb", planarconfig="separate", extrasamples=["unassalpha"]
+        )
+    else:
+        Image.fromarray(np.stack(planes, axis=-1), "RGBA").save(path)
+    return path
+
+
+@pytest.mark.parametrize("name", ["mask.png", "mask.tif", "planar.tif", "mask.exr"])
+@pytest.mark.parametrize("level", [0, 90, 255])
+def test_a_mask_that_is_cut_out_is_its_alpha_channel(name: str, level: int, tmp_path: Path) -> None:
+    colour = np.full((SIZE, SIZE), level, np.uint8)
+    assert (ps.read_mask(painted(tmp_path / name, colour, cut_out())) == cut_out()).all()
+
+
+@pytest.mark.parametrize("name", ["mask.png", "mask.tif", "planar.tif", "mask.exr"])
+def test_a_mask_that_is_painted_on_an_opaque_picture_is_what_is_white(name: str, tmp_path: Path) -> None:
+    path = painted(tmp_path / name, np.uint8(255) * cut_out(), np.ones((SIZE, SIZE), np.bool_))
+    assert (ps.read_mask(path) == cut_out()).all()
+
+
+def test_a_matte_of_an_alpha_channel_alone_is_a_mask_also_where_its_file_holds_a_part_of_the_picture(
+    tmp_path: Path,
+) -> None:
+    part = cut_out()[10:40, 12:50].astype(np.float16)
+    window = {"dataWindow": ((12, 10), (49, 39)), "displayWindow": ((0, 0), (SIZE - 1, SIZE - 1))}
+    OpenEXR.File({"type": OpenEXR.scanlineimage, **window}, {"A": part}).write(str(tmp_path / "matte.exr"))
+    assert (ps.read_mask(tmp_path / "matte.exr") == cut_out()).all()
+
+
+def test_a_palette_with_a_transparent_colour_is_a_mask_of_what_is_not(tmp_path: Path) -> None:
+    picture = Image.fromarray(np.uint8(1) * cut_out(), "P")
+    picture.putpalette([255, 0, 0, 0, 0, 255])
+    picture.save(tmp_path / "mask.png", transparency=0)
+    assert (ps.read_mask(tmp_path / "mask.png") == cut_out()).all()
+    picture.putpalette([0, 0, 0, 255, 255, 255, 9, 9, 9])
+    picture.save(tmp_path / "opaque.png", transparency=2)
+    assert (ps.read_mask(tmp_path / "opaque.png") == cut_out()).all()

@@ -23,7 +23,8 @@ MaskPath = Annotated[
     Path | None,
     typer.Option(
         "--mask",
-        help="A picture, white where to solve; or a folder or a numbered pattern (mask.####.png), one per result.",
+        help="A picture, white where to solve (or cut out in its alpha); or a folder or a numbered pattern "
+        "(mask.####.png), one per result.",
     ),
 ]
 FlatPath = Annotated[

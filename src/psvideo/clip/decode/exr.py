@@ -210,6 +210,17 @@ def _time_code(code: Any) -> str | None:
     return f"{code.hours:02d}:{code.minutes:02d}:{code.seconds:02d}{mark}{code.frame:02d}"
 
 
+def alpha(path: Path) -> NDArray[np.floating] | None:
+    """Return the first part's alpha channel, (row, col), 0 outside its data window; None where it has none."""
+    with _open(path, header_only=False) as file:
+        plane, attributes = file.channels().get("A"), file.header()
+        if plane is None:
+            return None
+        width_px, height_px = _size(attributes["displayWindow"])
+        head = Header(width_px=width_px, height_px=height_px, channels=1, bits=None)
+        return _in_display_window(plane.pixels, attributes, head)
+
+
 def _in_display_window(codes: NDArray[Any], attributes: Any, head: Header) -> NDArray[Any]:
     display, data = attributes["displayWindow"], attributes["dataWindow"]
     if codes.shape[:2] == (head.height_px, head.width_px) and np.array_equal(display[0], data[0]):

@@ -20,6 +20,8 @@ END = b"IEND\xaeB`\x82"
 TAIL = 1024
 COLOUR_TYPES = {0: 1, 2: 3, 3: 3, 4: 1, 6: 3}
 ALPHA_TYPES = (4, 6)
+COLOUR_TYPE_AT = 25
+"""Where in a file the type of its colours stands (PNG specification, 11.2.1)."""
 PALETTE = 3
 
 

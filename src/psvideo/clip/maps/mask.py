@@ -1,4 +1,4 @@
-"""A mask that a user painted: white where to solve."""
+"""A mask that a user painted: white where to solve, or cut out in the alpha channel."""
 
 import contextlib
 from pathlib import Path
@@ -10,6 +10,7 @@ from PIL import Image
 
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS, USUAL_KINDS
+from psvideo.clip.maps.painted_alpha import alpha_of
 from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import path_of
@@ -18,8 +19,11 @@ from psvideo.formats.paths import path_of
 def _codes(kind: str, path: Path) -> tuple[NDArray[Any], float]:
     """Decode a mask, and return which code is white.
 
-    PNGs may be saved in any of the ways in which painting programs save black and white (1 bit, palettes).
+    PNGs may be saved in any of the ways in which painting programs save black and white (1 bit, palettes). An alpha
+    channel that is not the same everywhere is the mask: colours beside it are whatever was cut out.
     """
+    if (alpha := alpha_of(kind, path)) is not None:
+        return alpha, 1.0
     if kind == "png":
         with contextlib.suppress(OSError, Image.DecompressionBombError), Image.open(path) as painted:
             if painted.mode in ("1", "P"):
@@ -41,8 +45,8 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     Returns
     -------
     numpy.ndarray
-        Shape (row, col), bool, True where the picture is brighter than half of its range; upright, as its file's EXIF
-        says.
+        Shape (row, col), bool, True where the picture is brighter than half of its range, or, where it has an alpha
+        channel that is not the same everywhere, where that is above a half; upright, as its file's EXIF says.
 
     Raises
     ------
