@@ -193,6 +193,20 @@ BROKEN_RIGS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("rig", "said"),
+    [
+        ("light = [[1, 2, 3]]", r"expected a table, \[\[light\]\]"),
+        ("[light]\nname = 'a'", r"one table: expected a list of them, so write \[\[light\]\]"),
+        ("[[light]]\nname = 'a'\ndirection = [0.1, 0.2]", r"direction' is \[0.1, 0.2\]: expected at least 3 values\.$"),
+        ("[[light]]\nname = 'a'\nintensity = [1, -2, 1]", r"toml: key 'light\[1\].intensity\[2\]' is -2: [^;]*\.$"),
+    ],
+)
+def test_a_value_of_another_shape_is_named_with_the_one_that_is_expected(rig: str, said: str) -> None:
+    with pytest.raises(PsvideoError, match=said):
+        parse_rig(f'schema = "psvideo-rig/1"\n{rig}\n', source="rig.toml")
+
+
 @pytest.mark.parametrize("case", BROKEN_RIGS)
 def test_a_broken_rig_is_reported_by_file_key_and_remedy(case: str) -> None:
     text, expected = BROKEN_RIGS[case]

@@ -137,7 +137,9 @@ def _one_a_key(errors: Sequence[Any]) -> list[Any]:
     for error in errors:
         by_key.setdefault(f"{_key_path(error['loc'])} {error['type'] == 'extra_forbidden'}", []).append(error)
     kept = []
-    for same in by_key.values():
+    for key, same in by_key.items():
+        if any(other.startswith(f"{key.split(' ')[0]}[") for other in by_key) and isinstance(same[0]["input"], list):
+            continue  # it may be a list, and what is wrong with one of its values is said of that
         kinds = [_expected(error["msg"]) for error in same]
         kept.append(same[0] if len(same) == 1 else same[0] | {"msg": f"expected {' or '.join(dict.fromkeys(kinds))}"})
     return kept
@@ -162,6 +164,16 @@ def _mistake(model: type[BaseModel], error: Any) -> str:
         return f"unknown key '{key}': {advice}"
     if error["type"] == "missing":
         return f"key '{key}' is missing"
+    if error["type"] in ("too_short", "too_long"):
+        allowed = error["ctx"].get("min_length", error["ctx"].get("max_length"))
+        least = "at least" if error["type"] == "too_short" else "at most"
+        return f"key '{key}' is {error['input']!r}: expected {least} {allowed} values"
+    name = ".".join(part for part in place if isinstance(part, str))
+    if error["type"] in ("model_type", "dict_type"):
+        table = f"[[{name}]]" if isinstance(place[-1], int) else f"[{name}]"
+        return f"key '{key}' is {error['input']!r}: expected a table, {table}, with keys below it"
+    if error["type"] == "list_type" and isinstance(error["input"], dict):
+        return f"'{key}' is one table: expected a list of them, so write [[{name}]], and not [{name}]"
     message = error["msg"].removeprefix("Value error, ")
     if message.startswith("Input should be "):
         message = f"expected {_expected(message)}"
