@@ -232,7 +232,7 @@ def _reference(samples: Array, lit: Illumination, seen: NDArray[np.bool_]) -> tu
     with np.errstate(invalid="ignore"):
         here = seen & (np.abs(samples) < DEFAULT.saturation).all(axis=1)
     values = np.where(here[:, None], samples, 0.0) * strength[:, None] / lit.intensities
-    weights = np.maximum(values, 0).sum(axis=0)
+    weights = _channel_weights(np.maximum(values, 0).sum(axis=0), lit)
     nothing = np.zeros(3), np.zeros(channels), 0.0
     if not weights.sum():
         return nothing
@@ -261,6 +261,14 @@ def _reference(samples: Array, lit: Illumination, seen: NDArray[np.bool_]) -> tu
     albedo = np.maximum(shade @ values[used] / (shade @ shade), 0)
     errors = together[used] - matrix[used] @ scaled
     return normal, albedo / strength.mean(), float(np.sqrt(np.mean(errors**2)))
+
+
+def _channel_weights(colour: Array, lit: Illumination) -> Array:
+    """By how much channels count: by colour, and by one over what dividing by the lights makes of their noise."""
+    noise = np.mean((lit.intensities.mean(axis=1, keepdims=True) / lit.intensities) ** 2, axis=0)
+    alike = colour / noise @ np.ones_like(colour) / (1 / noise).sum()
+    own = np.sqrt(noise.min() / noise)
+    return np.asarray((own * colour + (1 - own) * alike) / noise)
 
 
 def _frobenius_condition(matrix: Array) -> float:

@@ -64,7 +64,7 @@ def mark_lit_rows(task: Task, work: Work, wanted: Bytes, lit: Bytes, first: int,
                         continue
                     bright = ZERO
                     for channel in range(channels):
-                        bright += values[light * channels + channel, i]
+                        bright += values[light * channels + channel, i] * t.shares[channel]
                     over = is_clipped(t, samples, light, i) and is_seen(t.seen, light, row, col + i)
                     if over or bright * at(per, i) * share > t.dark:
                         found[row, col + i] = 1
@@ -98,14 +98,14 @@ def look_rows(
                     place += 1
                     if not values[light * channels, i] > ABSENT:
                         continue
-                    level = ZERO
+                    level, shows = ZERO, ZERO
                     for channel in range(channels):
                         level += values[light * channels + channel, i] * share
+                        shows += values[light * channels + channel, i] * share * t.shares[channel]
                     one = at(per, i)
-                    level *= one
-                    if not level > t.dark:
+                    if not shows * one > t.dark:
                         continue
-                    level *= scale
+                    level *= one * scale
                     if count[place] < MOST_COUNTED:
                         count[place] += 1
                     for channel in range(3):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +26,25 @@ class Illumination:
     intensities: Doubles
     names: tuple[str, ...] = ()
     near: NearField | None = None
+
+    @cached_property
+    def shares(self) -> Doubles:
+        """By how much each channel counts (channel,), beside what a surface's own colour says: all 1 under white light.
+
+        Divided by its light a channel that lights hardly send holds as much more noise. Where noise is alike in all
+        channels, this is one over what the lights' mean square makes of it: with lights of one colour, that of a least
+        squares fit. It is the same for all lights, for what a surface of another colour shows must compare.
+        """
+        divided_by = self.intensities / self.intensities.mean(axis=1, keepdims=True)
+        return np.asarray(1 / np.mean(1 / divided_by**2, axis=0))
+
+    @cached_property
+    def noise_shares(self) -> tuple[float, float]:
+        """What combining the channels of a grey surface leaves of a channel's noise variance, in the dark and of what
+        grows with light: both one over the number of channels under white light."""
+        shares, total = self.shares, self.shares.sum()
+        times = self.intensities.mean(axis=1, keepdims=True) / self.intensities
+        return float(1 / total), float((shares**2 * times).sum(axis=1).mean() / total**2)
 
     @property
     def singular_values(self) -> Doubles:

@@ -103,7 +103,7 @@ class Solving:
         if not self.looks_at_subject(len(plates)):
             return None
         noise = noise_of(plates, lit)
-        usable = _usable(noise, lit.intensities.shape[1], "robust")
+        usable = _usable(noise, lit, "robust")
         return huber1981.look(
             plates, lit, seen=seen, mask=mask, usable=usable, reweighting=EVERYTHING, plate_noise=noise,
             spare=self.spare, unsure=unsure,
@@ -121,7 +121,7 @@ class Solving:
     ) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by."""
         noise = noise_of(plates, lit)
-        usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
+        usable = _usable(noise, lit, self.method(len(plates)))
         one = Evidence(
             plates=plates,
             lit=lit,
@@ -169,9 +169,9 @@ class Solving:
         )
 
 
-def _usable(noise: PlateNoise, channels: int, method: Method) -> Usable:
+def _usable(noise: PlateNoise, lit: Illumination, method: Method) -> Usable:
     """Return which measurements count: those that stand out of noise, and what else the method leaves out."""
-    dark = CERTAIN * max(noise.dark / np.sqrt(channels), noise.least)
+    dark = CERTAIN * max(noise.dark * np.sqrt(lit.noise_shares[0]), noise.least)
     return Usable(dark_level=float(dark), shadow_ratio=INDIRECT if method == "robust" else 0.0)
 
 

@@ -74,6 +74,8 @@ class Task(NamedTuple):
     tone: Floats  # (light, channel, 4): gain, offset and ceiling of the samples; factor from measurement to plate
     matrix: Floats  # (light, 3): intensity * direction, one for all channels; 0 for a copy
     per_strength: Floats  # (light,): 1 / intensity
+    shares: Floats  # (channel,): by how much channels count beside the surface's own colour, 1 in the mean
+    believed: Floats  # (channel,): how far that colour is taken from the channel itself, 1 in the best lit one
     near: Near  # empty where all lights are distant; else matrix and per_strength hold for the surface's middle only
     inverse: Floats  # (light, 3): the matrix's transposed pseudo-inverse, for samples as they are; 0 for a copy
     origin: Floats  # (3,): what black samples would give with it, to be added
@@ -126,6 +128,7 @@ class Weights(NamedTuple):
 class Spread(NamedTuple):
     """How noise spreads into normals under all lights.
 
+    shares: (channel,), by how much channels count beside the surface's own colour, as shares of white light's.
     inverse: (3, 3), of the lights' normal equations. scale: degrees that hold a share of errors, per radian.
     variances: of a dark sample, per unit of albedo, of its square; the last instead of that for what residuals say.
     toward: (3,), the lights' mean direction by their strengths: what a normal has along it is the mean light there, as
@@ -134,6 +137,7 @@ class Spread(NamedTuple):
         spreads there for the lights' directions; empty for distant lights.
     """
 
+    shares: Floats
     inverse: Floats
     variances: Floats
     scale: np.float32
@@ -191,6 +195,8 @@ def task(
         tone=_filled(tone, copies, mode="edge"),
         matrix=_filled(matrix, copies),
         per_strength=_filled(unit / strength, copies, mode="edge"),
+        shares=_filled(lit.shares / lit.shares.mean(), 0),
+        believed=_filled(np.sqrt(lit.shares / lit.shares.max()), 0),
         inverse=_filled(gain[:, :1] * inverse.T, copies),
         origin=_filled(inverse @ tone[:, 0, 1], 0),
         near=_near(lit, unit, copies),

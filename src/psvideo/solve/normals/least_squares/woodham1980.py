@@ -45,12 +45,12 @@ def solve(
     spare: a folder in whose files large pictures are worked on.
     looks: what else looks at rows once they are solved, while their samples are there.
 
-    Of three channels, one normal: each channel counts by its own brightness in the pixel; then each gets its
-    least-squares albedo for that normal. A pixel is valid where three or more usable measurements remain, their lights
-    are not nearly coplanar (Frobenius condition number at most PIXEL_CONDITION, or the rig's own), and the normal turns
-    from the camera's axis by 110 degrees at most (in perspective, what is seen may turn by more than 90). With three
-    lights that means: none in shadow, none saturated. What remains in a valid pixel is noise, and what is not matte
-    (highlights, light from neighbouring surfaces).
+    Of three channels, one normal: each channel counts by its albedo in the pixel, and by how much of it the lights
+    send; then each gets its least-squares albedo for that normal. A pixel is valid where three or more usable
+    measurements remain, their lights are not nearly coplanar (Frobenius condition number at most PIXEL_CONDITION, or
+    the rig's own), and the normal turns from the camera's axis by 110 degrees at most (in perspective, what is seen may
+    turn by more than 90). With three lights that means: none in shadow, none saturated. What remains in a valid pixel
+    is noise, and what is not matte (highlights, light from neighbouring surfaces).
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """

@@ -1,9 +1,10 @@
 """Compiled part of both solvers: pixels of three channels all of whose measurements are usable, under distant lights.
 
 One matrix L holds for all of them, so that each channel's L^T m is added up as the samples are read; the normal and all
-albedos follow from these three vectors, without looking at the lights again. With the channels' shares s_c of the
-light, g = (L^T L)^-1 sum_c s_c L^T m_c; for a normal n a channel's albedo is n . L^T m_c / n . L^T L n. Where a pixel
-lacks a measurement its whole block is solved by the general rule, to the same result but for rounding.
+albedos follow from these three vectors, without looking at the lights again. With the channels' weights s_c
+(``measuring.weigh_channels``), g = (L^T L)^-1 sum_c s_c L^T m_c; for a normal n a channel's albedo is
+n . L^T m_c / n . L^T L n. Where a pixel lacks a measurement its whole block is solved by the general rule, to the same
+result but for rounding.
 """
 
 import numpy as np
@@ -28,7 +29,7 @@ from psvideo.solve.normals.loops.blocks import (
     Y,
     Z,
 )
-from psvideo.solve.normals.loops.measuring import samples_of
+from psvideo.solve.normals.loops.measuring import samples_of, weigh_channels
 from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.task import Samples, Task
 
@@ -130,15 +131,10 @@ def _add_one(task: Task, w: Floats, values: Floats, start: int, n: int, light: i
 
 @FUSED.inlined
 def _solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: int) -> bool:
-    """Leave g in the planes X, Y, Z and the combined measurements in ``measurements``; False where one is in shadow.
-
-    The channels are weighted as ``measuring.combine`` does.
-    """
+    """Leave g in the planes X, Y, Z and the combined measurements in ``measurements``; False where one is in shadow."""
     line = flattened(values)
+    weigh_channels(task, w, n)
     for i in range(n):
-        total = w[XX + i] + w[YY + i] + w[ZZ + i]
-        share = ONE / total if total > ZERO else ZERO
-        w[XX + i], w[YY + i], w[ZZ + i] = w[XX + i] * share, w[YY + i] * share, w[ZZ + i] * share
         w[SUM + i], w[LOW + i] = ZERO, -MISSING
     for light in range(task.lights):
         per, v, m = at(task.per_strength[light], 0), line[3 * BLOCK * light :], measurements[light]

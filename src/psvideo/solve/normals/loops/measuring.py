@@ -9,7 +9,21 @@ from numba.np.numpy_support import carray
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened, pointer
 from psvideo.model.arrays import Bytes, Floats
-from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, COUNT, LIMIT, MISSING, ONE, SUM, TINY, XX, YY, ZERO, ZZ
+from psvideo.solve.normals.loops.blocks import (
+    ABSENT,
+    BLOCK,
+    COUNT,
+    LIMIT,
+    MISSING,
+    ONE,
+    SUM,
+    THREE,
+    TINY,
+    XX,
+    YY,
+    ZERO,
+    ZZ,
+)
 from psvideo.solve.normals.loops.near_kernel import at, place_lights
 from psvideo.solve.normals.task import Samples, Task
 
@@ -72,9 +86,11 @@ def is_seen(seen: Bytes, light: int, row: int, col: int) -> bool:
 
 @FUSED.inlined
 def combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
-    """One measurement per light from three channels, each weighted by its own brightness over the lights.
+    """One measurement per light from three channels, each weighted by its own albedo and by how well lights show it.
 
-    That is the matched filter for noise alike in all channels: a channel in which the surface is black adds nothing.
+    With lights of one colour that is the matched filter for noise alike in all channels: one in which the surface is
+    black adds nothing, nor does one that lights do not send, of which nothing but noise is left once it is divided by
+    them (``Illumination.shares``).
     """
     for plane in (XX, YY, ZZ):
         w[plane : plane + n] = ZERO
@@ -84,14 +100,32 @@ def combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
             w[XX + i] += max(red[i], ZERO)
             w[YY + i] += max(green[i], ZERO)
             w[ZZ + i] += max(blue[i], ZERO)
-    for i in range(n):
-        total = w[XX + i] + w[YY + i] + w[ZZ + i]
-        w[SUM + i] = ONE / total if total > ZERO else ZERO
+    weigh_channels(task, w, n)
     for light in range(task.lights):
         red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
         for i in range(n):
-            value = (w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]) * w[SUM + i]
+            value = w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]
             m[light, i] = value if red[i] > ABSENT else MISSING
+
+
+@FUSED.inlined
+def weigh_channels(task: Task, w: Floats, n: int) -> None:
+    """From three channels' light in the planes XX, YY, ZZ to their weights, which add up to 1 (0 in the dark).
+
+    What hardly any light shows of a surface's colour is mostly noise: there the colour is in part that of the others.
+    """
+    share_red, share_green, share_blue = task.shares[0], task.shares[1], task.shares[2]
+    own_red, own_green, own_blue = task.believed[0], task.believed[1], task.believed[2]
+    other_red, other_green, other_blue = (ONE - own_red) / THREE, (ONE - own_green) / THREE, (ONE - own_blue) / THREE
+    for i in range(n):
+        red, green, blue = w[XX + i], w[YY + i], w[ZZ + i]
+        light = share_red * red + share_green * green + share_blue * blue
+        red = share_red * (own_red * red + other_red * light)
+        green = share_green * (own_green * green + other_green * light)
+        blue = share_blue * (own_blue * blue + other_blue * light)
+        total = red + green + blue
+        one = ONE / total if total > ZERO else ZERO
+        w[XX + i], w[YY + i], w[ZZ + i] = red * one, green * one, blue * one
 
 
 @FUSED.inlined

@@ -69,6 +69,7 @@ def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
     near = task.near
     return Task(
         lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(matrix), lent(per_strength),
+        lent(task.shares), lent(task.believed),
         Near(
             lent(near.positions), lent(near.is_near), lent(near.axes), lent(near.anisotropy), lent(near.strengths),
             lent(near.depth), lent(near.pinhole),

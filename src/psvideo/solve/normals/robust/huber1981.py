@@ -74,7 +74,7 @@ def solve(
     solution = Solution.of(
         plates, lit, seen, mask, usable, black_level, scale, half=half, residual=residual, spare=spare, threads=threads
     )
-    noise, reweighting = _noise_of(plate_noise, solution), _dimmed(reweighting, plate_noise)
+    noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
     if misfit is None:
         found, misfit, step = _first_look(solution, reweighting, noise)
         if misfit is not None and subject is None:
@@ -114,17 +114,17 @@ def look(
     Arguments are those of ``solve``.
     """
     solution = Solution.of(plates, lit, seen, mask, usable, 0.0, 1.0, half=False, residual=False, spare=spare)
-    noise, reweighting = _noise_of(plate_noise, solution), _dimmed(reweighting, plate_noise)
+    noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
     found, misfit, step = _first_look(solution, reweighting, noise)
     if misfit is None:
         return None
     return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0, unsure=unsure)
 
 
-def _noise_of(plate_noise: PlateNoise | None, solution: Solution) -> tuple[float, float]:
+def _noise_of(plate_noise: PlateNoise | None, lit: Illumination) -> tuple[float, float]:
     """Return the variance of the channels' combined noise in the dark, and per unit of light; 0 where unknown."""
-    channels = len(solution.result.albedo)
-    return (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
+    dark, light = lit.noise_shares
+    return (0.0, 0.0) if plate_noise is None else (plate_noise.read * dark, plate_noise.photon * light)
 
 
 def _dimmed(reweighting: Reweighting, plate_noise: PlateNoise | None) -> Reweighting:

@@ -96,7 +96,7 @@ def _points(
     size = np.linalg.norm(sent, axis=-1)
     here = seen & (samples.max(axis=-1) < usable.saturation)
     each = samples / (size[..., None] * lit.intensities[:, None, : samples.shape[-1]])
-    colour = (np.maximum(each, 0) * here[..., None]).sum(axis=0)
+    colour = (np.maximum(each, 0) * here[..., None]).sum(axis=0) * lit.shares[: samples.shape[-1]]
     measured = (each * colour).sum(axis=-1) / np.maximum(colour.sum(axis=-1), 1e-9)
     mean = (np.maximum(measured, 0) * here).sum(axis=0) / np.maximum(here.sum(axis=0), 1)
     least = np.maximum(usable.dark_level / lit.intensities.mean(), usable.shadow_ratio * mean)

@@ -177,15 +177,16 @@ class _Spread:
         lit = one.lit
         strength, lights = lit.intensities.mean(axis=1), len(lit.intensities)
         matrix = lit.directions * strength[:, None]
-        channels = 1 if surface.albedo.ndim == 2 else surface.albedo.shape[-1]
-        mean = float(strength.mean())
+        channels, (_, photon_share), mean = len(lit.shares), lit.noise_shares, float(strength.mean())
         floors = [(share * mean) ** 2 for share in (how.least_share, float(LIGHTS))]
-        variances = [noise.read / channels, noise.photon * mean / channels, *floors]
+        photon = noise.photon * photon_share * float(np.sqrt(lit.shares.mean()))  # ``judge_rows`` divides by the shares
+        variances = [noise.read / channels, photon * mean, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
         plain = surface.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
         return cls(
             step=one.step_of(surface.valid.shape),
             noise=Spread(
+                shares=lit.shares.astype(np.float32),
                 inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
                 variances=np.array(variances, np.float32),
                 scale=np.float32(np.degrees(how.held)),

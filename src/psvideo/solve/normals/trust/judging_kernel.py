@@ -34,7 +34,7 @@ def judge_rows(
     n, a, f, d, out, kept = lent(normals), lent(albedo), lent(fit), lent(doubt), lent(error), lent(trusted)
     dim, wider = lent(spread.dim), lent(spread.wider)
     channels, cols = len(a), out.shape[1]
-    share, scale = ONE / np.float32(channels), spread.scale * spread.scale
+    share, shares, scale = ONE / np.float32(channels), lent(spread.shares), spread.scale * spread.scale
     v, inverse = spread.variances, spread.inverse  # numbers outside the loops, which then become vectors
     read, photon, own, of_fit = v[0], v[1], v[2], v[3]
     tx, ty, tz = spread.toward[0], spread.toward[1], spread.toward[2]
@@ -56,12 +56,14 @@ def judge_rows(
             _fill_between(wider, row, step, ends, place, way, turning)
         sizes[:], means[:] = ZERO, TINY
         for channel in range(channels):
+            counts_by = shares[channel] * share
             for col in range(cols):
                 one = decoded(a[channel, row, col])
-                sizes[col] += one * one * share
-                means[col] += one * share
+                counted = one * counts_by
+                sizes[col] += one * counted
+                means[col] += counted
         for col in range(cols):
-            means[col] = sizes[col] / means[col]  # what the channels are together, each counted by its brightness
+            means[col] = sizes[col] / means[col]  # what the channels are together, each counted as the solvers do
             sizes[col] = np.sqrt(sizes[col])  # noise over it goes with the squares
         for col in range(cols):
             x, y, z = decoded(n[0, row, col]), decoded(n[1, row, col]), decoded(n[2, row, col])
@@ -147,7 +149,7 @@ def indirect_rows(
             for i in range(-col % step, width, step):
                 size = ZERO
                 for channel in range(channels):
-                    size += decoded(a[channel, row, col + i]) * each
+                    size += decoded(a[channel, row, col + i]) * each * t.shares[channel]
                 if not size > ZERO:
                     continue
                 nx, ny, nz = decoded(n[0, row, col + i]), decoded(n[1, row, col + i]), decoded(n[2, row, col + i])
@@ -158,7 +160,7 @@ def indirect_rows(
                     lamp, per = of_light(t.matrix, light), t.per_strength[light]
                     level = ZERO
                     for channel in range(channels):
-                        level += values[light * channels + channel, i] * each
+                        level += values[light * channels + channel, i] * each * t.shares[channel]
                     one = at(per, i)
                     lx, ly, lz = at(lamp, i)
                     cosine = (lx * nx + ly * ny + lz * nz) * one
