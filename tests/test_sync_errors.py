@@ -74,3 +74,27 @@ def test_what_black_cuts_off_noise_adds_to_rows_that_saw_little_is_in_the_error(
         ratios.append(np.sqrt(np.mean(off_s**2)) / (timing.phase_error_rows * timing.row_time_s))
     assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 1.7
     assert np.max(ratios) < 2.3
+
+
+@pytest.mark.parametrize(("power", "nominal"), [(1.02, 1.0), (0.98, 1.0), (0.98, 1.0003)])
+def test_a_curve_that_is_two_percent_off_is_no_other_exposure(
+    power: float, nominal: float, make_plan: PlanMaker
+) -> None:
+    """Freed, the exposure would move all flashes by half of what it seems to be off; a plan's that truly is, does."""
+    plan = make_plan(height_px=96, width_px=16, shutter=0.5, readout=0.7)
+    stated = replace(plan, camera=replace(plan.camera, exposure_s=nominal * plan.camera.exposure_s))
+    ratios, off_rows = [], []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        plates = {slot: (0.2 + 0.5 * rng.random((96, 16))).astype(np.float32) for slot in plan.lit_slots}
+        clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
+        shot = expose(plates, plan, frames=40, clock=clock, noise=CAMERA_NOISE, bits=12, seed=seed)
+        read = np.maximum(shot.frames, 0.0) ** power
+        timing = timing_from_rows(stated, np.arange(40), read.mean(axis=2, dtype=np.float64))
+        true_s = np.array([flash.start_s for flash in shot.flashes])
+        off_s = timing.start_s - true_s[np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)]
+        off_rows.append(float(np.sqrt(np.mean(off_s**2))) / timing.row_time_s)
+        ratios.append(off_rows[-1] / timing.phase_error_rows)
+    assert np.max(off_rows) < 0.02
+    assert np.sqrt(np.mean(np.square(ratios))) < 1.5
+    assert np.max(ratios) < 2.5

@@ -15,7 +15,8 @@ from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.freed import freed
+from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, maybe_otherwise_s, straight, straightened
+from psvideo.sync.rowfit.unknowns.freed import Freed, freed
 from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import across, restless
@@ -90,10 +91,11 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
     best = _best_fit(plan, stretches(fine), tracked.beat, free)
-    if best.rows.value is fine.value:
+    if len(best.rows.value) == len(fine.value):
         plain, as_seen = _as_seen(plan, best.rows, best.fit)
     else:
-        plain, as_seen = throughout(plan, fine, best.rows, best.fit, tracked.beat, follow=best.slack_s == 0.0)
+        whole_take = straight(fine, best.curves)
+        plain, as_seen = throughout(plan, whole_take, best.rows, best.fit, tracked.beat, follow=best.slack_s == 0.0)
     stray = jitter(plan, plain, as_seen) if best.slack_s == 0.0 else STEADY
     loose_s = unsteady_s(plan, plain, as_seen, stray)
     return ClipFit(
@@ -118,6 +120,7 @@ class _Best:
     """The best fit of some rows, and what it cannot know of its own error.
 
     ``apart_s``: by how much times differ with how they are fitted. ``slack_s`` and ``soft_s`` are as in ``ClipFit``.
+    ``curves`` were taken out of the rows.
     """
 
     rows: Profiles
@@ -125,6 +128,7 @@ class _Best:
     apart_s: float
     slack_s: float
     soft_s: float
+    curves: tuple[Curve, ...]
 
 
 def _best_fit(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> _Best:
@@ -132,13 +136,28 @@ def _best_fit(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) ->
     rows, fit = _restless(plan, rows, fitted(plan, rows, start, free), free)
     fit = _with_mains(plan, rows, fit, free)
     rows, fit, apart_s = _in_short_windows(plan, rows, fit, free)
-    differing = freed(plan, rows, fit, free)
-    fit = differing.fit
+    held = straightened(plan, rows, fit, free)
+    differing = freed(plan, held.rows, held.fit, free)
+    final, doubts_s = _told_from_curve(plan, held, differing, free)
+    rows, fit = final.rows, final.fit
     if fit.errors_s:
         fit, apart_s = _with_window_errors(plan, rows, fit)
     fit, slack_s = centred(plan, rows, fit)
-    apart_s = float(np.hypot(differing.unsure_s, apart_s))
-    return _Best(rows=rows, fit=fit, apart_s=apart_s, slack_s=slack_s, soft_s=differing.soft_s)
+    apart_s = float(np.sqrt(apart_s**2 + differing.unsure_s**2 + doubts_s**2))
+    return _Best(rows=rows, fit=fit, apart_s=apart_s, slack_s=slack_s, soft_s=differing.soft_s, curves=final.curves)
+
+
+def _told_from_curve(
+    plan: Plan, held: Straightened, differing: Freed, free: tuple[str, ...]
+) -> tuple[Straightened, float]:
+    """Return what was freed with the curve that shows beside it, and by how much times are in doubt because exposure
+    and readout may be otherwise."""
+    final = replace(held, fit=differing.fit, unsure_s=0.0)
+    if "exposure_s" in differing.fit.errors_s:
+        beside = straightened(plan, held.rows, differing.fit, tuple(differing.fit.errors_s))
+        final = replace(beside, curves=(*held.curves, *beside.curves))
+    otherwise_s = maybe_otherwise_s(plan, final.rows, final.fit, tuple(final.fit.errors_s))
+    return final, float(np.hypot(final.unsure_s, otherwise_s))
 
 
 def _error_s(plan: Plan, best: _Best, as_seen: Fit, stray: Jitter) -> float:
