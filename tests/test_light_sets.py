@@ -8,6 +8,7 @@ import pytest
 from PIL import ExifTags, Image, PngImagePlugin
 
 from psvideo.calibrate.light_files import find_plates, find_stills
+from psvideo.calibrate.light_folder import find_light_pictures, shows_lights
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.cli.app import main
 from psvideo.clip.stills import look_at
@@ -218,3 +219,88 @@ def test_photographs_are_read_by_the_curve_that_their_files_name(
     if says is not None:
         assert look_at(sorted(tmp_path.iterdir())).transfer == curve
     assert f"the pictures are read as {curve!r}" in caplog.text
+
+
+def test_lights_whose_names_end_alike_are_told_apart(tmp_path: Path) -> None:
+    lights = ("left", "right", "top_left", "top_right")
+    for name in lights:
+        still(tmp_path / "exact" / f"{name}.png", 0.5)
+        still(tmp_path / "with_words" / f"take3_{name}.png", 0.5)
+    for folder in ("exact", "with_words"):
+        found = find_stills(tmp_path / folder, lights=lights)
+        assert [files[0].stem.removeprefix("take3_") for files in found.by_light.values()] == list(lights)
+
+
+def test_a_light_whose_name_ends_with_dark_is_a_light(tmp_path: Path) -> None:
+    for name in ("a_key", "a_after_dark", "a_dark"):
+        still(tmp_path / f"{name}.png", 0.5)
+    found = find_stills(tmp_path, lights=("key", "after_dark"))
+    assert found.names == ("key", "after_dark")
+    assert [file.name for file in found.ambient] == ["a_dark.png"]
+
+
+def test_a_second_picture_of_the_dark_or_of_the_room_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name in ("L1", "L2", "a_dark", "dark", "outline", "room"):
+        still(tmp_path / f"{name}.png", 0.1 if name == "dark" else 0.4)
+    found = read_images(tmp_path)
+    assert found.images[:, 0, 0] == pytest.approx([0.3, 0.3], abs=1e-4)
+    assert "a_dark.png: is assumed to be no light's picture and left aside" in caplog.text
+    assert "room.png: is assumed to be no light's picture and left aside" in caplog.text
+
+
+def test_a_second_folder_of_the_dark_is_no_light(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name in ("key", "left", "ambient", "dark"):
+        still(tmp_path / name / "1.png", 0.1 if name == "ambient" else 0.4)
+    found = read_images(tmp_path)
+    assert found.names == ("key", "left")
+    assert "dark: is assumed to be no light's folder and left aside" in caplog.text
+
+
+def test_pictures_are_the_lights_whatever_folders_lie_beside_them(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for name in ("L1", "L2", "L3", "L4", "old/first_try", "dark/1"):
+        still(tmp_path / f"{name}.png", 0.5)
+    assert read_images(tmp_path).names == ("L1", "L2", "L3", "L4")
+    for folder in ("old", "dark"):
+        assert f"{folder}: is assumed to be no light's folder and left aside" in caplog.text
+
+
+def test_a_single_picture_beside_folders_is_none_of_a_set(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name in ("key/1", "left/1", "top/1", "preview"):
+        still(tmp_path / f"{name}.png", 0.5)
+    assert read_images(tmp_path).names == ("key", "left", "top")
+    assert "preview.png: is assumed to be no light's picture and left aside" in caplog.text
+
+
+def test_folders_that_a_plan_names_go_before_pictures_beside_them(tmp_path: Path) -> None:
+    for name in ("key/1", "left/1", "a", "b"):
+        still(tmp_path / f"{name}.png", 0.5)
+    found = find_light_pictures(tmp_path, lights=("key", "left"))
+    assert found.by_light["left"] == (tmp_path / "left" / "1.png",)
+    assert [path.name for path in found.left_aside] == ["a.png", "b.png"]
+    with_pictures = find_light_pictures(tmp_path, lights=("a", "b"))
+    assert with_pictures.by_light["b"] == (tmp_path / "b.png",)
+    assert [path.name for path in with_pictures.left_aside] == ["key", "left"]
+
+
+@pytest.mark.parametrize("lights", [(), ("key", "left")])
+def test_a_picture_and_a_folder_of_each_light_are_refused(lights: tuple[str, ...], tmp_path: Path) -> None:
+    for name in ("key/1", "left/1", "key", "left"):
+        still(tmp_path / f"{name}.png", 0.5)
+    with pytest.raises(PsvideoError, match="holds a picture and a folder of pictures of each of key, left"):
+        find_light_pictures(tmp_path, lights=lights)
+
+
+def test_a_clip_stays_one_with_a_folder_of_pictures_beside_its_frames(tmp_path: Path) -> None:
+    for name in ("f.0001", "f.0002", "old/first_try"):
+        still(tmp_path / f"{name}.png", 0.5)
+    assert not shows_lights(tmp_path, ("key", "left"))
+    assert shows_lights(tmp_path, ("old", "left"))
+
+
+def test_numbers_in_names_may_be_written_in_any_way(tmp_path: Path) -> None:
+    """A raised 2 is a digit and no number."""
+    for name in ("L²", "L10", "L9"):
+        still(tmp_path / name / "1.png", 0.5)
+    assert set(read_images(tmp_path).names) == {"L²", "L10", "L9"}

@@ -792,6 +792,16 @@ def test_pictures_that_bear_a_rigs_lights_need_not_be_all(tmp_path: Path) -> Non
         pair_stills(folder, ("key", "left", "rim", "top"), named=True, whose="rig.toml")
 
 
+def test_names_that_end_alike_are_told_apart_and_what_shows_no_light_is_named(tmp_path: Path) -> None:
+    names = ("left", "top_left", "top")
+    for number, name in enumerate([*(f"take_{name}" for name in names), "a_dark", "dark", "room"]):
+        save8(tmp_path / f"{name}.png", np.full((8, 8), 0.1 * number))
+    found = pair_stills(tmp_path, names, named=True, whose="lights.lp")
+    assert [file.stem for file in found.files] == [f"take_{name}" for name in names]
+    assert found.dark == tmp_path / "dark.png"
+    assert [file.name for file in found.aside] == ["a_dark.png", "room.png"]
+
+
 def test_a_name_that_begins_two_pictures_is_asked_about(tmp_path: Path) -> None:
     folder = named_pictures(tmp_path / "photos", ("a_1.jpg", "a_1_b.jpg", "a_2_b.jpg", "a_3_b.jpg"))
     found = pair_stills(folder, ("a_1", "a_2_b", "a_3_b"), named=True, whose="lights.lp")

@@ -2,10 +2,11 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import AMBIENT_NAMES, MASK_NAMES, ROOM_NAMES, LightFiles
+from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
+from psvideo.calibrate.still_names import sorted_by_name
 from psvideo.clip.folder import KINDS, USUAL_KINDS, number_of, unread_in
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name
@@ -24,12 +25,11 @@ def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | Non
 
     Lights come in the order of ``lights``, else of the timing.json beside them, else of their names.
     """
-    within = sorted((entry for entry in folder.iterdir() if entry.is_dir()), key=lambda entry: _natural(entry.name))
-    held = {entry.name: pictures_in(entry) for entry in within if entry.name not in NOT_LIGHTS}
-    held = {name: files for name, files in held.items() if files}
-    ambient = next((tuple(held.pop(name)) for name in AMBIENT_NAMES if name in held), ())
-    room = next((held.pop(name)[0] for name in ROOM_NAMES if name in held), None)
-    if not held or (set(held) == {"frames"}):
+    every = folders_with_pictures(folder)
+    dark, room = _those_named(every, AMBIENT_NAMES, lights), _those_named(every, ROOM_NAMES, lights)
+    odd = [*dark[1:], *room[1:]]
+    held = {name: files for name, files in every.items() if name not in (*dark, *room)}
+    if not held or (set(held) == {FRAMES}):
         return None
     order = lights or _timed_lights(folder)
     lacking = [name for name in order if name not in held]
@@ -43,10 +43,22 @@ def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | Non
     return LightFiles(
         folder=folder,
         by_light=_side_by_side({_checked(name, folder / name): held[name] for name in names}),
-        ambient=ambient,
+        ambient=tuple(every[dark[0]]) if dark else (),
         ambient_is_off=made_by_split,
-        room=room,
+        room=every[room[0]][0] if room else None,
+        left_aside=tuple(folder / name for name in (*(name for name in held if name not in names), *odd)),
     )
+
+
+def folders_with_pictures(folder: Path) -> dict[str, list[Path]]:
+    """Return the pictures in each folder of a folder that holds some, by the folder's name."""
+    within = sorted((entry for entry in folder.iterdir() if entry.is_dir()), key=lambda entry: _natural(entry.name))
+    held = {entry.name: pictures_in(entry) for entry in within if entry.name not in NOT_LIGHTS}
+    return {name: files for name, files in held.items() if files}
+
+
+def _those_named(held: Iterable[str], words: Sequence[str], lights: Sequence[str]) -> list[str]:
+    return [word for word in words if word in held and word not in lights]
 
 
 def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> LightFiles:
@@ -54,19 +66,17 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
 
     A file belongs to the light whose name it bears; where none bears one of ``lights``, the numbered files belong to
     the lights in order; without ``lights`` every file is a light of the file's name. A file named ambient or dark shows
-    the scene with every light off, one named room, outline or ref with the room light on; one named mask is left aside.
+    the scene with every light off, one named room, outline or ref with the room light on; a second of these, and one
+    named mask, is left aside.
 
     Raises PsvideoError where there are no pictures, two of one light, or not as many as ``lights``.
     """
     folder = path if isinstance(path, Path) else path[0].parent
-    files = pictures_in(path) if isinstance(path, Path) else list(path)
-    dark = [file for file in files if any(bears(file, name) for name in AMBIENT_NAMES) and file.stem not in lights]
-    room = [file for file in files if file.stem.lower() in ROOM_NAMES]
-    masks = [file for file in files if any(bears(file, name) for name in MASK_NAMES) and file.stem not in lights]
-    files = [file for file in files if file not in dark and file not in room and file not in masks]
+    kinds = sorted_by_name(pictures_in(path) if isinstance(path, Path) else path, lights)
+    files, dark, room = list(kinds.of_lights), kinds.dark, kinds.room
     if not files:
         raise PsvideoError(f"{folder}: holds no pictures of lights. {_instead(folder)}")
-    named = {light: [file for file in files if bears(file, light)] for light in lights}
+    named = {light: [file for file in files if kinds.of_lights[file] == light] for light in lights}
     chosen = {light: found for light, found in named.items() if found} or _in_order(folder, _main_group(files), lights)
     _refuse_twice(folder, chosen)
     lacking = [light for light in lights if light not in chosen]
@@ -81,7 +91,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
         by_light={_checked(light, found[0]): tuple(found) for light, found in chosen.items()},
         ambient=tuple(dark[:1]),
         room=room[0] if room else None,
-        left_aside=(*(file for file in files if file not in used), *masks),
+        left_aside=(*(file for file in files if file not in used), *dark[1:], *room[1:], *kinds.masks),
     )
 
 
@@ -108,14 +118,7 @@ def pictures_in(folder: Path) -> list[Path]:
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
-
-
-def bears(file: Path, light: str) -> bool:
-    """Return whether a file's name is the light's, or ends with it after a mark: ``take3_key.png``, ``key.png``; words
-    in small letters also mean large ones (``DARK``)."""
-    wanted = re.escape(light)
-    return re.search(rf"(^|[^A-Za-z0-9])({wanted}|{wanted.upper()}|{wanted.capitalize()})$", file.stem) is not None
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
 def _main_group(files: list[Path]) -> list[Path]:

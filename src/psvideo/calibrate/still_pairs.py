@@ -5,10 +5,12 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from psvideo.calibrate.light_files import bears, find_stills
+from psvideo.calibrate.light_files import find_stills
 from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
+from psvideo.calibrate.still_names import bears, meant_by
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError
@@ -86,9 +88,9 @@ def pair_stills(
             f"Pictures belong to lights by order, since {whose} names none of them: {_shown(known, chosen)}. Where "
             "that is wrong, the rig will not fit."
         )
-    aside = [
-        file for file in (*files, *found.left_aside) if file not in (*chosen, *masks) and file.resolve() not in apart
-    ]
+    used = {*chosen, *masks, dark, mask}
+    others = (*files, *found.left_aside, *found.ambient, *([found.room] if found.room else []))
+    aside = [file for file in others if file not in used and file.resolve() not in apart]
     names = tuple(known[place] for place in places) if keep_names else _own_names(chosen)
     return Pairs(files=tuple(chosen), names=names, places=places, how=how, dark=dark, mask=mask, aside=tuple(aside))
 
@@ -144,8 +146,9 @@ def _refuse_named_twice(known: Sequence[str], chosen: Sequence[Path], whose: str
 def _matches(names: Sequence[str], files: Sequence[Path]) -> list[list[Path]]:
     """Return for every name of a list the files that it may mean: in the first way in which each means one, else in the
     first in which every file is meant once, else what their whole names say."""
-    ways = (_by_whole_name, _by_number, _by_beginning)
-    found = [[way(_stem_of(name), files) for name in names] for way in ways]
+    stems = [_stem_of(name) for name in names]
+    ways = (partial(_by_whole_name, stems=stems), _by_number, _by_beginning)
+    found = [[way(stem, files) for stem in stems] for way in ways]
     exact = (one for one in found if all(len(each) == 1 for each in one))
     fewer = (one for one in found if _all_found(one, files))
     return next(exact, None) or next(fewer, found[0])
@@ -178,10 +181,11 @@ def _alike(stem: str) -> str:
     return unicodedata.normalize("NFC", stem).casefold()
 
 
-def _by_whole_name(stem: str, files: Sequence[Path]) -> list[Path]:
-    """Return the files of a name, or those whose name ends with it, as with a light's."""
+def _by_whole_name(stem: str, files: Sequence[Path], *, stems: Sequence[str]) -> list[Path]:
+    """Return the files of a name, or those whose name ends with it, as with a light's, and with no longer one of the
+    list's ``stems``."""
     exact = [file for file in files if _alike(file.stem) == _alike(stem) or _alike(file.name) == _alike(stem)]
-    return exact or [file for file in files if bears(file, stem)]
+    return exact or [file for file in files if bears(file, stem) and meant_by(file, stems) == stem]
 
 
 def _by_number(stem: str, files: Sequence[Path]) -> list[Path]:

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.calibrate.light_files import find_plates, find_stills
+from psvideo.calibrate.light_files import find_stills
+from psvideo.calibrate.light_folder import find_light_pictures, shows_lights
 from psvideo.calibrate.light_pictures import (
     LightFiles,
     LightPictures,
@@ -173,32 +174,27 @@ def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = 
     if path.is_file() and path.suffix.lower() not in MOVIES:
         raise UsageError(f"{path}: is one file. Name the folder that holds the pictures, or a movie ({MOVIES[0]}, …).")
     plan_path = reading.plan or (path / PLAN_FILE if (path / PLAN_FILE).is_file() else None)
-    if path.is_file() or (plan_path is not None and _is_clip(path, plan_path)):
+    if path.is_file() or (plan_path is not None and not shows_lights(path, read_plan(plan_path).lights)):
         return _of_clip(open_take(path, plan=reading.plan, frames=reading.frames), reading, watch)
     plan = None if plan_path is None else read_plan(plan_path)
     lights = () if plan is None else plan.lights
-    files = find_plates(path, lights=lights) or find_stills(path, lights=lights)
+    files = find_light_pictures(path, lights=lights)
     return _of_files(files, None if plan is None else plan.camera.encoding, reading)
-
-
-def _is_clip(path: Path, plan_path: Path) -> bool:
-    """Return whether a folder holds a clip's frames, not stills that bear the lights' names nor a folder per light."""
-    if find_plates(path) is not None:
-        return False
-    lights = set(read_plan(plan_path).lights)
-    stems = {file.stem for folder in (path, path / "frames") if folder.is_dir() for file in folder.iterdir()}
-    return not lights <= stems
 
 
 def _of_files(files: LightFiles, planned: Encoding | None, reading: Reading) -> LightSets:
     """Return pictures as sets; ``planned`` is how they code light where a plan says it."""
     read, notes = _encoding(files, planned, reading.transfer)
-    aside = tuple(f"{file}: is assumed to be no light's picture and left aside" for file in files.left_aside)
+    aside = tuple(f"{one}: is assumed to be no light's {_kind(one)} and left aside" for one in files.left_aside)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
     room = None if files.room is None else read_picture(files.room, read)[0]
     return LightSets(
         name=files.folder.resolve().name, names=files.names, sets=sets, room=room, warnings=aside, notes=notes
     )
+
+
+def _kind(path: Path) -> str:
+    return "folder" if path.is_dir() else "picture"
 
 
 def _encoding(files: LightFiles, planned: Encoding | None, transfer: str | None) -> tuple[Encoding, tuple[str, ...]]:
