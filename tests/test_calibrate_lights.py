@@ -1,8 +1,12 @@
 """Lights measured on matte spheres, white targets and any matte scene; and guessed where nothing was calibrated."""
 
 import json
+import re
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,13 +23,17 @@ from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
 from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.cli.app import main
-from psvideo.errors import PsvideoError
+from psvideo.cli.options.typed import parse_box, parse_seconds, parse_starts_s
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.exr_files import write_exr
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.model.choices import Prior
 from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.runs.calibrate.flat_field import flat_field, white_target
+from psvideo.runs.calibrate.matte_sphere import matte_sphere
+from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
+from psvideo.runs.calibrate.readout import readout
 
 Array = NDArray[np.float64]
 HIGH, WIDE = 150, 200
@@ -479,3 +487,58 @@ def test_pictures_that_a_rig_knows_nothing_of_are_named_with_the_rig(
         "known.toml: The rig has no light named 'top', which the plan flashes or pictures are"
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"circle": (float("nan"), 90, 60)}, "`circle` nan: expected"),
+        ({"circle": (95, 70, 1e5)}, "`circle` 95,70,100000: is larger than the picture of 200 x 150 pixels"),
+        ({"circle": (300, 70, 60)}, "`circle` 300,70,60: is outside of the picture of 200 x 150 pixels"),
+        ({"focal_px": float("inf")}, "`focal_px` inf: expected 1 to"),
+        ({"albedo": 0.0}, "`albedo` 0: expected a share above 0"),
+        ({"albedo": -0.5}, "`albedo` -0.5: expected a share above 0"),
+    ],
+)
+def test_numbers_of_a_matte_sphere_that_cannot_be_meant_are_refused(
+    options: dict[str, Any], says: str, shot: tuple[Path, Path], tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=re.escape(says)):
+        matte_sphere(shot[0], out=tmp_path / "rig.toml", **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"principal_px": (float("nan"), 3.0), "focal_px": 500.0}, "`principal_px` nan: expected"),
+        ({"focal_mm": float("inf"), "sensor_mm": 36.0}, "`focal_mm` inf: expected 0.1 to"),
+        ({"focal_mm": 50.0, "sensor_mm": 0.0}, "`sensor_mm` 0: expected 0.1 to"),
+        ({"circle": [(float("inf"), 1.0, 1.0)]}, "`circle` inf: expected"),
+        ({"radius_mm": float("nan")}, "`radius_mm` nan"),
+    ],
+)
+def test_numbers_of_a_mirror_sphere_that_cannot_be_meant_are_refused(
+    options: dict[str, Any], says: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=re.escape(says)):
+        mirror_sphere([tmp_path], out=tmp_path / "rig.toml", **options)
+
+
+@pytest.mark.parametrize("number", ["led_hz", "led_tolerance_ppm", "zoom", "near_s"])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, 1e300])
+def test_numbers_of_a_readout_that_cannot_be_meant_are_refused(number: str, value: float, tmp_path: Path) -> None:
+    given: dict[str, Any] = {"led_hz": 1000.0, number: value}
+    with pytest.raises(UsageError, match=re.escape(f"`{number}` {value:g}: expected")):
+        readout([tmp_path], **given)
+
+
+@pytest.mark.parametrize("text", ["nan,nan,nan,nan", "inf,0,9,9", "0,0,1e400,9"])
+def test_a_box_of_no_numbers_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="expected left,top,right,bottom, numbers in pixels"):
+        parse_box(text)
+
+
+@pytest.mark.parametrize("parse", [partial(parse_seconds, option="--flash"), parse_starts_s])
+def test_a_time_without_an_end_is_refused(parse: Callable[[str], object]) -> None:
+    with pytest.raises(UsageError, match="1e400"):
+        parse("1e400" if parse is parse_starts_s else "1e400s")

@@ -12,7 +12,7 @@ from psvideo.calibrate.light_folder import find_light_pictures, shows_lights
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.cli.app import main
 from psvideo.clip.stills import look_at
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.runs.photographs.light_sets import Reading, open_light_sets, read_images
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
@@ -141,6 +141,9 @@ def test_a_strobed_clip_and_its_plates_show_the_same(tmp_path: Path) -> None:
     assert from_clip.names == from_plates.names
     assert from_clip.frames == from_plates.frames > 1
     assert np.abs(from_clip.images - from_plates.images).max() < 1e-3
+    with pytest.raises(UsageError, match=r"its frames are read as 'linear' as .*plan.toml says, not as `transfer` 'sr"):
+        open_light_sets(clip, Reading(transfer="srgb"))
+    assert open_light_sets(clip, Reading(transfer="Linear")).names == from_clip.names
 
 
 def test_what_does_not_fit_is_said(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ The message names the file (or the option), says what was found, what was expect
 
 import contextlib
 import difflib
+import math
 from collections.abc import Iterable, Iterator
 
 
@@ -55,6 +56,17 @@ def check_kind(name: str, given: object, kind: type | tuple[type, ...], expected
     if not isinstance(given, kind):
         shown = f"{given!r:.60} ({type(given).__name__})" if isinstance(given, (str, int, float)) else None
         raise UsageError(f"`{name}` is {shown or f'of type {type(given).__name__}'}; expected {expected}.")
+
+
+def check_within(name: str, number: float, least: float, most: float, *, unit: str = "") -> None:
+    """Raise UsageError where a parameter is no number from ``least`` to ``most`` that is finite, as NaN is.
+
+    >>> check_within("focal_px", float("nan"), 1, 1e6, unit="pixels")
+    Traceback (most recent call last):
+    psvideo.errors.UsageError: `focal_px` nan: expected 1 to 1e+06 pixels.
+    """
+    if not (least <= number <= most and abs(number) < math.inf):
+        raise UsageError(f"`{name}` {number:g}: expected {least:g} to {most:g} {unit}".rstrip() + ".")
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

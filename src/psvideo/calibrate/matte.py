@@ -81,7 +81,7 @@ def measure_matte_sphere(pictures: LightPictures, outline: Outline, *, albedo: f
     moved = [_pixels(pictures, outline.view, place) for place in _outlines_off(outline)]
     found = [_light(name, n, sphere, moved) for n, name in enumerate(pictures.names)]
     good = [light.intensity for light in found if not light.fault]
-    scale = 1 / albedo if albedo else 1 / float(np.mean(good)) if good else 1.0
+    scale = 1 / albedo if albedo is not None else 1 / float(np.mean(good)) if good else 1.0
     return [replace(light, intensity=light.intensity * scale) for light in found]
 
 

@@ -118,7 +118,7 @@ def check_schema(found: object, expected: str, *, source: str) -> None:
     name, _, version = str(found).partition("/")
     if name != kind:
         raise PsvideoError(f"{source}: schema is {found!r}, expected {expected!r}. This is another kind of file.")
-    if not version.isdigit() or int(version) != int(major):
+    if not version.isdecimal() or int(version) != int(major):
         raise PsvideoError(
             f"{source}: schema is {found!r}; this psvideo reads {expected!r}. "
             "A newer file needs a newer psvideo: upgrade, or write the file again with this version."

@@ -46,7 +46,7 @@ class Trace:
     @property
     def lights(self) -> tuple[int, ...]:
         """The numbers of the lights that were ever on."""
-        return tuple(sorted(int(name) for name in self.edges if name.isdigit()))
+        return tuple(sorted(int(name) for name in self.edges if name.isdecimal()))
 
 
 def read_trace(path: Path) -> Trace:

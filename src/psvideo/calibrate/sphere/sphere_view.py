@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.errors import UsageError, check_within
 from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Vector
 
@@ -147,6 +148,12 @@ def _unit(vectors: Doubles) -> Doubles:
     return unit
 
 
+LONGEST_PX = 1e7
+"""No lens is longer: 20 m over pixels of 2 micrometres."""
+FARTHEST_PX = 1e6
+"""Nothing that a picture shows is further from it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Looking:
     """How spheres are looked for: how many a picture holds, or where they are (x, y, radius), found by hand.
@@ -160,8 +167,30 @@ class Looking:
     focal_widths: float | None = None
     principal_px: tuple[float, float] | None = None
 
+    def __post_init__(self) -> None:
+        """Raise UsageError where a number cannot be meant."""
+        if self.focal_px is not None:
+            check_within("focal_px", self.focal_px, 1, LONGEST_PX, unit="pixels")
+        for number in self.principal_px or ():
+            check_within("principal_px", number, -FARTHEST_PX, FARTHEST_PX, unit="pixels")
+        for x, y, radius in self.circles:
+            check_within("circle", radius, 0, FARTHEST_PX, unit="pixels of radius")
+            for number in (x, y):
+                check_within("circle", number, -FARTHEST_PX, FARTHEST_PX, unit="pixels")
+
     def view(self, *, width_px: int, height_px: int) -> SphereView:
-        """Return the view of pictures of this size; the lens's axis goes through their middle unless it is given."""
+        """Return the view of pictures of this size; the lens's axis goes through their middle unless it is given.
+
+        Raises UsageError where an outline that was found by hand is larger than the picture, or nowhere in it.
+        """
+        for x, y, radius in self.circles:
+            outside = not (-radius < x < width_px + radius and -radius < y < height_px + radius)
+            if outside or radius > max(width_px, height_px):
+                raise UsageError(
+                    f"`circle` {x:g},{y:g},{radius:g}: is {'outside of' if outside else 'larger than'} the picture of "
+                    f"{width_px} x {height_px} pixels. Expected a sphere's middle and radius, in pixels from the top "
+                    "left."
+                )
         middle = ((width_px - 1) / 2, (height_px - 1) / 2)
         focal_px = self.focal_px if self.focal_widths is None else self.focal_widths * width_px
         return SphereView(focal_px=focal_px, principal_px=self.principal_px or middle)

@@ -31,8 +31,10 @@ def parse_seconds(text: str, *, option: str) -> float:
     below = float(found[2] or 1)
     if below == 0:
         raise UsageError(f"{option} {text!r} divides by zero. Write a time such as 0.8ms, 800us or 1/1250s.")
-    per_second = round(1 / SECONDS.get(unit, 1.0))
-    return float(found[1]) / below / per_second
+    seconds = float(found[1]) / below / round(1 / SECONDS.get(unit, 1.0))
+    if not math.isfinite(seconds):
+        raise UsageError(f"{option} {text!r} is no number of seconds. Write a time such as 0.8ms, 800us or 1/1250s.")
+    return seconds
 
 
 def parse_starts_s(text: str) -> list[float]:
@@ -42,7 +44,7 @@ def parse_starts_s(text: str) -> list[float]:
     [0.0, 1.3]
     """
     parts = [part.strip() for part in text.split(",")]
-    if not all(re.fullmatch(NUMBER, part, re.IGNORECASE) for part in parts):
+    if not all(re.fullmatch(NUMBER, part, re.IGNORECASE) and math.isfinite(float(part)) for part in parts):
         raise UsageError(f"--starts {text!r} is not a list of seconds. Write one for each clip, such as 0,1.3,2.1.")
     return [float(part) for part in parts]
 
@@ -159,7 +161,7 @@ def parse_numbers(text: str, count: int, *, option: str, form: str) -> tuple[flo
         values = tuple(float(word) for word in text.split(","))
     except ValueError:
         values = ()
-    if len(values) != count or (count == 3 and values[2] <= 0):
+    if len(values) != count or not all(map(math.isfinite, values)) or (count == 3 and values[2] <= 0):
         raise UsageError(f"{option} {text!r}: expected {form}, numbers in pixels with commas between them.")
     return values
 

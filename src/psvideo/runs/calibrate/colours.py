@@ -9,8 +9,8 @@ from psvideo.errors import said_of
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
-from psvideo.runs.calibrate.flat_field import check_albedo, white_target
-from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
+from psvideo.runs.calibrate.flat_field import white_target
+from psvideo.runs.calibrate.reading import check_albedo, pictures_of, reading_of, rig_out
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 

@@ -17,7 +17,7 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import Ground, ground_of
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
-from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out, warn_of_unmeasured
+from psvideo.runs.calibrate.reading import check_albedo, pictures_of, reading_of, rig_out, warn_of_unmeasured
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 UNEVEN = 0.1
@@ -81,12 +81,6 @@ def flat_field(
             "intensity per light, not a map. Write the map with `flat` flat.toml, and give it to psvideo normals"
         )
     return FlatFieldCalibration(lights=tuple(lights), rig=measured)
-
-
-def check_albedo(albedo: float) -> None:
-    """Raise UsageError where a target's albedo cannot be meant."""
-    if not 0 < albedo <= 1:
-        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
 
 
 def white_target(

@@ -15,7 +15,7 @@ from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
 from psvideo.pictures.matte_sphere import matte_picture
-from psvideo.runs.calibrate.reading import picture_beside, pictures_of, reading_of, rig_out
+from psvideo.runs.calibrate.reading import check_albedo, picture_beside, pictures_of, reading_of, rig_out
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 
@@ -54,13 +54,17 @@ def matte_sphere(
     - ``albedo``: the sphere's, above 0 and up to 1; left out, intensities are relative, their mean 1.
     - ``focal_px``: the focal length in pixels; left out, the view is assumed orthographic.
 
-    Raises UsageError where an output exists, and PsvideoError where no sphere is found or no light can be measured.
+    Raises UsageError where an output exists or a number cannot be meant, and PsvideoError where no sphere is found or
+    no light can be measured.
     """
     rig_path = rig_out(out, force=force)
     picture = picture_beside(rig_path, force=force)
+    looking = Looking(focal_px=focal_px, circles=() if circle is None else (circle,))
+    if albedo is not None:
+        check_albedo(albedo)
     reading = reading_of(plan, frames, first_light, transfer)
     found = pictures_of(Path(pictures), reading, watch=watch, caller=caller)
-    view = Looking(focal_px=focal_px).view(width_px=found.width_px, height_px=found.height_px)
+    view = looking.view(width_px=found.width_px, height_px=found.height_px)
     outline, doubt = (
         (_found(Path(pictures), found, view), "")
         if circle is None

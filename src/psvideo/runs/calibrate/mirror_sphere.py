@@ -10,7 +10,7 @@ from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import PsvideoError, UsageError, check_within
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
@@ -20,6 +20,7 @@ from psvideo.runs.photographs.light_sets import Reading, sets_of
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0
+LONGEST_MM, LARGEST_SENSOR_MM = 20_000.0, 1000.0
 
 
 def mirror_sphere(
@@ -93,11 +94,15 @@ def looking_for(
     focal_mm: float | None,
     sensor_mm: float | None,
 ) -> Looking:
-    """Return how spheres are looked for, from the parameters of that name. Raises UsageError where they are at odds."""
+    """Return how spheres are looked for, from the parameters of that name. Raises UsageError where they are at odds or
+    cannot be meant."""
     if focal_px is not None and focal_mm is not None:
         raise UsageError("`focal_px` and `focal_mm` both say the focal length; give one of them.")
     if (focal_mm is None) != (sensor_mm is None):
         raise UsageError("`focal_mm` and `sensor_mm` go together: the focal length, and the width of the sensor.")
+    if focal_mm is not None and sensor_mm is not None:
+        check_within("focal_mm", focal_mm, 0.1, LONGEST_MM, unit="mm")
+        check_within("sensor_mm", sensor_mm, 0.1, LARGEST_SENSOR_MM, unit="mm")
     widths = None if focal_mm is None or sensor_mm is None else focal_mm / sensor_mm
     return Looking(spheres=spheres, circles=tuple(circle), focal_px=focal_px, focal_widths=widths)
 

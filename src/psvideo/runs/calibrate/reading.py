@@ -6,6 +6,7 @@ from pathlib import Path
 from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets
 from psvideo.clip.transfer import check_transfer
 from psvideo.compute.progress import Watch
+from psvideo.errors import UsageError
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, check_ending, refuse_existing
 from psvideo.model.rig import Rig
@@ -37,6 +38,12 @@ def reading_of(plan: Path | str | None, frames: str | None, first_light: str | N
     check_transfer(transfer)
     given = None if plan is None else Path(plan)
     return Reading(plan=given, frames=frames, first_light=first_light, transfer=transfer)
+
+
+def check_albedo(albedo: float) -> None:
+    """Raise UsageError where the albedo of a target or a sphere cannot be meant."""
+    if not 0 < albedo <= 1:
+        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
 
 
 def warn_of_unmeasured(known: Rig, names: Sequence[str], caller: Caller) -> None:

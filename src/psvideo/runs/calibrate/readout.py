@@ -18,11 +18,19 @@ from psvideo.calibrate.stripes.records import (
 )
 from psvideo.calibrate.strobed_readout import StrobedReadout, measure_take_readout
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import PsvideoError, UsageError, check_within
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.sync.open_take import open_take
 
 CRYSTAL_PPM = 100.0
+MEANT = {
+    "led_hz": (0.1, 1e7, "Hz"),
+    "led_tolerance_ppm": (0, 1e6, "ppm"),
+    "rows": (2, 1e5, "rows"),
+    "zoom": (0.01, 100, ""),
+    "near_s": (1e-7, 10, "seconds"),
+}
+"""The least and the most of each number that can be meant: no row of a sensor opens in less than 0.1 microseconds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +78,7 @@ def readout(
 
     Raises UsageError where parameters do not fit together, and PsvideoError where nothing can be measured.
     """
+    _check_numbers(led_hz=led_hz, led_tolerance_ppm=led_tolerance_ppm, rows=rows, zoom=zoom, near_s=near_s)
     made = MeasuredMode(make=make, model=model, mode=mode)
     paths = [Path(path) for path in pictures]
     if led_hz is None:
@@ -92,6 +101,14 @@ def readout(
         camera_line=camera_line(measured, camera, led),
         record_line=record_line(measured, camera, led, date=date.today().isoformat()),
     )
+
+
+def _check_numbers(**given: float | None) -> None:
+    """Raise UsageError where a number cannot be meant."""
+    for name, number in given.items():
+        if number is not None:
+            least, most, unit = MEANT[name]
+            check_within(name, number, least, most, unit=unit)
 
 
 def _refuse_of_stripes(**given: object) -> None:

@@ -25,6 +25,7 @@ from psvideo.calibrate.light_pictures import (
 from psvideo.calibrate.still_places import Place
 from psvideo.clip import Take
 from psvideo.clip.folder import MOVIES
+from psvideo.clip.transfer import find_curve
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
@@ -67,7 +68,7 @@ class Reading:
 
     ``plan`` names the plan where none lies beside the pictures; ``frames`` chooses file numbers of a clip, or sets
     counted from 1; ``transfer`` says how stills code light (left out: as the plan says; without a plan as the files do,
-    else sRGB for JPEG, and linear for other kinds).
+    else sRGB for JPEG, and linear for other kinds). A clip is read as its plan says.
     """
 
     plan: Path | None = None
@@ -175,7 +176,9 @@ def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = 
         raise UsageError(f"{path}: is one file. Name the folder that holds the pictures, or a movie ({MOVIES[0]}, …).")
     plan_path = reading.plan or (path / PLAN_FILE if (path / PLAN_FILE).is_file() else None)
     if path.is_file() or (plan_path is not None and not shows_lights(path, read_plan(plan_path).lights)):
-        return _of_clip(open_take(path, plan=reading.plan, frames=reading.frames), reading, watch)
+        take = open_take(path, plan=reading.plan, frames=reading.frames)
+        _refuse_other_curve(take, reading.transfer)
+        return _of_clip(take, reading, watch)
     plan = None if plan_path is None else read_plan(plan_path)
     lights = () if plan is None else plan.lights
     files = find_light_pictures(path, lights=lights)
@@ -205,6 +208,17 @@ def _encoding(files: LightFiles, planned: Encoding | None, transfer: str | None)
         return Encoding(transfer=transfer), ()
     curve, because = files.curve()
     return Encoding(transfer=curve), (f"the pictures are read as {curve!r}, {because}; `transfer` names another curve",)
+
+
+def _refuse_other_curve(take: Take, transfer: str | None) -> None:
+    """Raise UsageError where a clip's frames are to be read by another curve than they will be solved by."""
+    planned = take.clip.encoding.transfer
+    if transfer is not None and find_curve(transfer) is not find_curve(planned):
+        raise UsageError(
+            f"{take.clip.path}: is a clip, and its frames are read as {planned!r} as {take.clip.plan_path} says, not "
+            f"as `transfer` {transfer!r}. Leave it out, or put the plan's [camera] transfer right: what is measured "
+            "and what is solved must be read alike."
+        )
 
 
 def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
