@@ -7,6 +7,7 @@ its median is the intensity.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,10 @@ LEAST_COSINE = 0.05
 """Of the angle between a target and a light: at this one, a direction wrong by a degree costs a third of the intensity,
 and at less any share of it."""
 MOST_ERROR = 0.5
-"""Intensities less certain than this share of themselves are none: no flat target differs so much from row to row."""
+"""Intensities less certain than this share of themselves are none: no flat target differs so much from part to part."""
+PARTS, LEAST_PX = 4, 8
+"""A target's parts, so many a side, say by how they differ how well it is known; so that each has four pixels at least,
+it has so many rows and columns."""
 MOST_PIXELS = 20_000
 ROUNDS = 5
 BLOCKS = 24
@@ -71,33 +75,39 @@ def measure_flat_field(
     lights = rig.select(pictures.names)
     measured = [_flat(light, n, pictures, target, ground) for n, light in enumerate(lights)]
     found = [light for light, _ in measured]
+    brighter, is_even = _brighter_part(np.array([blocks for _, blocks in measured]), target)
     worst = max(found, key=lambda one: one.intensity_error)
-    if worst.intensity_error > MOST_ERROR:
+    if worst.intensity_error > MOST_ERROR and not (brighter and is_even):
         raise PsvideoError(
             f"Light {worst.name!r}: its intensity comes out at {worst.intensity.mean():.3g} +- "
             f"{worst.intensity_error:.0%}, as where the pictures show no white target, or more than it. Expected a "
             "matte white one that faces the camera or lies in the rig's plane: name its part of the picture with `box`."
         )
-    _refuse_part(np.array([blocks for _, blocks in measured]), target)
+    if brighter:
+        raise PsvideoError(brighter)
     return found
 
 
-def _refuse_part(blocks: Doubles, target: Target) -> None:
-    """Raise PsvideoError where the target fills only a part of the picture, or of the box; ``blocks`` (light, row,
-    col) are what it shows under every light, 1 in the median."""
+def _brighter_part(blocks: Doubles, target: Target) -> tuple[str, bool]:
+    """Return what is to be said where the target fills only a part of the picture, or of the box, else ""; and whether
+    that part is as even as a flat target under each light. ``blocks`` (light, row, col) are what shows under every
+    light, 1 in the median."""
     alike = np.exp(np.log(np.maximum(blocks, 1e-3)).mean(axis=0))
     alike /= np.nanmedian(alike)
     brightest = float(np.nanpercentile(alike, 95))
     if not brightest > PART:
-        return
-    rows, cols = np.nonzero(alike > np.sqrt(brightest))
+        return "", False
+    inside = alike > np.sqrt(brightest)
+    low, high = np.nanpercentile(blocks[:, inside], [20, 80], axis=1)
+    rows, cols = np.nonzero(inside)
     top, bottom = _from_blocks(rows, alike.shape[0], target.rows)
     left, right = _from_blocks(cols, alike.shape[1], target.cols)
-    raise PsvideoError(
+    said = (
         f"A part of the picture, about {left},{top},{right},{bottom} (left, top, right, bottom), is {brightest:.1f} "
         "times as bright as most of it under all lights. Expected the white target alone: name its part of the picture "
         "with `box`, or go nearer."
     )
+    return said, bool((high < PART * low).all())
 
 
 def _from_blocks(at: NDArray[np.intp], count: int, whole: slice) -> tuple[int, int]:
@@ -129,14 +139,20 @@ def on_target(
     least_share: float = LEAST_SHARE,
 ) -> tuple[Doubles, NDArray[np.bool_]]:
     """Return what light ``n`` of the pictures sends to a target, (row, col, channel), the same everywhere but for
-    falloff that the rig does not explain; and which pixels count, ``least_share`` of them at least.
+    falloff that the rig does not explain, infinite where saturated; and which pixels count, ``least_share`` at least.
 
-    Raises PsvideoError where too much is saturated or unseen, or the light does not reach the target.
+    Raises PsvideoError where the target is too small, too much is saturated or unseen, or the light does not reach it.
     """
     part = (target.rows, target.cols)
     values = pictures.images[n][part].astype(np.float64)
+    if min(values.shape[:2]) < LEAST_PX:
+        raise PsvideoError(
+            f"The white target is {values.shape[1]} x {values.shape[0]} pixels: how well it is known cannot be said. "
+            f"Expected {LEAST_PX} x {LEAST_PX} at least: name a larger part of the picture with `box`, or go nearer."
+        )
     clipped = pictures.saturated[n][part]
     values, clipped = (one if one.ndim == 3 else one[..., None] for one in (values, clipped))
+    values[clipped.any(axis=2)] = np.inf
     usable = ~clipped.any(axis=2) & pictures.seen[n][target.rows, None]
     if usable.mean() < least_share:
         raise PsvideoError(
@@ -158,15 +174,12 @@ def _flat(
 ) -> tuple[FlatLight, Doubles]:
     """Return a light's strength, and what the target shows in blocks, 1 in the median."""
     flat, usable = on_target(light, n, pictures, target, ground)
-    level = np.median(flat[usable], axis=0)
+    known = usable | np.isinf(flat).any(axis=2)
+    level = _median(flat[known])
     if np.min(level) <= 0:
         raise PsvideoError(f"Light {light.name!r}: the white target is black in a channel. Check that it was flashed.")
-    rows = np.array_split(np.arange(flat.shape[0]), 4)
-    patches = [
-        np.median(flat[rows_[0] : rows_[-1] + 1][usable[rows_[0] : rows_[-1] + 1]].mean(axis=1))
-        for rows_ in rows
-        if len(rows_) and usable[rows_[0] : rows_[-1] + 1].any()
-    ]
+    medians = [_median(flat[part][known[part]]).mean() for part in parts_of(flat.shape) if usable[part].any()]
+    patches = [one for one in medians if np.isfinite(one)]
     mean = float(level.mean())
     grey = np.where(usable, flat.mean(axis=2) / mean, np.nan)
     coefficients, left = _smooth(grey, target, pictures)
@@ -181,6 +194,18 @@ def _flat(
         left=left,
     )
     return measured, blocks
+
+
+def _median(values: Doubles) -> Doubles:
+    """Return the medians of values (pixel, channel), of which less than half may be infinite: what is clipped is
+    brighter than the others."""
+    return np.asarray(np.quantile(values, 0.5, axis=0, method="lower"))
+
+
+def parts_of(shape: tuple[int, ...]) -> list[tuple[slice, slice]]:
+    """Return the rows and columns of a picture's parts, PARTS a side."""
+    rows, cols = (np.linspace(0, size, PARTS + 1).astype(int).tolist() for size in shape[:2])
+    return [(slice(*one), slice(*other)) for one in pairwise(rows) for other in pairwise(cols)]
 
 
 def _in_blocks(grey: Doubles) -> Doubles:

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from psvideo.calibrate.flat_field import Target, on_target
+from psvideo.calibrate.flat_field import Target, on_target, parts_of
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
@@ -17,8 +17,6 @@ from psvideo.model.rig import Light, Rig
 
 LEAST_SHARE = 0.98
 """Of the card that may not be clipped: where the brightest channel is cut off, the others seem to see more."""
-PATCHES = 4
-"""Bands of the card whose differences say how well its colour is known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,10 +83,9 @@ def _measured(
     level = np.median(flat[usable], axis=0)
     if level.max() <= 0:
         raise PsvideoError(f"Light {light.name!r}: the white card is black under it. Check that it was flashed.")
-    bands = [rows for rows in np.array_split(np.arange(len(flat)), PATCHES) if usable[rows].any()]
-    medians = [np.median(flat[rows][usable[rows]], axis=0) for rows in bands]
+    medians = [np.median(flat[part][usable[part]], axis=0) for part in parts_of(flat.shape) if usable[part].any()]
     shares = np.array([one / max(one.max(), 1e-12) for one in medians])
-    return np.maximum(level, 0.0), shares.std(axis=0) / np.sqrt(max(len(bands) - 1, 1))
+    return np.maximum(level, 0.0), shares.std(axis=0) / np.sqrt(max(len(medians) - 1, 1))
 
 
 def _together(lights: Sequence[Light]) -> tuple[tuple[str, ...], ...]:
