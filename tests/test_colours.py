@@ -209,6 +209,45 @@ def test_a_card_that_clips_and_colours_that_are_alike_are_refused() -> None:
         measure_led_colours(grey, rig_of(), TARGET)
 
 
+def lone_leds(*names: str) -> Rig:
+    """Return LEDs of these colours, each in a place of its own."""
+    turns = np.arange(len(names))
+    places = np.stack([0.6 * np.cos(turns), 0.6 * np.sin(turns), np.full(len(names), 0.8)], axis=1).tolist()
+    return Rig(
+        lights=tuple(
+            Light(name=f"L{n}", direction=(x, y, z), intensity=(1.1,), colour=COLOURS[name])
+            for n, (name, (x, y, z)) in enumerate(zip(names, places, strict=True))
+        )
+    )
+
+
+@pytest.mark.parametrize("names", [("red", "red", "green", "green", "blue", "blue"), ("red", "green", "blue", "red")])
+def test_colours_of_lone_leds_are_measured_in_any_order_and_the_most_alike_are_named(names: tuple[str, ...]) -> None:
+    rig = lone_leds(*names)
+    found = measure_led_colours(card(np.random.default_rng(1), rig), rig, TARGET)
+    one, other = found.together
+    assert names[int(one[1:])] == names[int(other[1:])]
+    assert not found.known
+    for measured, light in zip(with_colours(rig, found).lights, rig.lights, strict=True):
+        np.testing.assert_allclose(measured.by_channel, light.by_channel, atol=2e-3)
+
+
+def test_a_plan_says_which_colours_must_differ(make_plan: MakePlan) -> None:
+    rig = lone_leds("red", "red", "green", "green", "blue", "blue")
+    pictures = card(np.random.default_rng(1), rig)
+
+    def plan(*flashes: str) -> Plan:
+        lit = [PlannedFlash(lights={f"L{n}": 1.0 for n in one}, duration_s=0.0008) for one in flashes]
+        return replace(make_plan(dark=False), flashes=tuple(lit))
+
+    found = measure_led_colours(pictures, rig, TARGET, plan=plan("024", "135"))
+    assert found.known
+    assert found.condition < 1.6
+    with pytest.raises(PsvideoError, match="Flash 1 of the plan lights L0, L1, L2 together, and their colours cannot"):
+        measure_led_colours(pictures, rig, TARGET, plan=plan("012", "345"))
+    assert not measure_led_colours(pictures, rig, TARGET, plan=plan(*"012345")).known
+
+
 def test_calibrate_colours_writes_a_rig_that_takes_flashes_apart(tmp_path: Path) -> None:
     rig, folder = rig_of(), tmp_path / "card"
     folder.mkdir()

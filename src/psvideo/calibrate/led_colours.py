@@ -10,9 +10,17 @@ from psvideo.calibrate.flat_field import Target, on_target, parts_of
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
-from psvideo.model.irradiance.colours import CHANNELS, MOST_COLOUR_CONDITION, colour_condition, lamps_of, most_alike
+from psvideo.model.irradiance.colours import (
+    CHANNELS,
+    MOST_COLOUR_CONDITION,
+    colour_condition,
+    lamps_of,
+    most_alike,
+    unmixing_of,
+)
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.intensity import with_measured
+from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 
 LEAST_SHARE = 0.98
@@ -23,7 +31,8 @@ LEAST_SHARE = 0.98
 class LedColours:
     """What was measured: ``seen`` (light, channel) is intensity times colour, ``error`` its standard error in shares of
     the light's brightest channel; ``condition`` belongs to ``together``, those of the lights that flash at once whose
-    colours are the hardest to tell apart. ``flashes_s`` is for how long each light shone, where that is known.
+    colours are the hardest to tell apart; where it is not ``known`` which flash at once, of all that might.
+    ``flashes_s`` is for how long each light shone, where that is known.
     """
 
     names: tuple[str, ...]
@@ -31,16 +40,18 @@ class LedColours:
     error: Doubles
     together: tuple[str, ...]
     condition: float
+    known: bool
     flashes_s: tuple[float, ...] | None = None
 
 
 def measure_led_colours(
-    pictures: LightPictures, rig: Rig, target: Target, *, ground: Ground | None = None
+    pictures: LightPictures, rig: Rig, target: Target, *, ground: Ground | None = None, plan: Plan | None = None
 ) -> LedColours:
-    """Measure the matrix of lights and channels on a white card.
+    """Measure the matrix of lights and channels on a white card. ``plan`` is that of the shoot, where it is known: it
+    says which lights flash together; else those that stand in one place do; else nothing is known of that.
 
     Raises PsvideoError where the pictures are grey, the card clips or is black under a light, or the colours of lights
-    that are to flash together cannot be separated.
+    that flash together cannot be separated.
     """
     if pictures.images.ndim == 3:
         raise PsvideoError(
@@ -50,7 +61,7 @@ def measure_led_colours(
     lights = rig.select(pictures.names)
     found = [_measured(light, n, pictures, target, ground) for n, light in enumerate(lights)]
     seen, error = (np.stack([one[part] for one in found]) for part in (0, 1))
-    groups = _together(lights)
+    groups, known = _together(lights, seen, plan)
     conditions = [colour_condition(seen[[pictures.names.index(name) for name in group]]) for group in groups]
     worst = int(np.argmax(conditions))
     colours = LedColours(
@@ -59,9 +70,12 @@ def measure_led_colours(
         error=error,
         together=groups[worst],
         condition=conditions[worst],
+        known=known,
         flashes_s=pictures.flashes_s,
     )
-    if colours.condition > MOST_COLOUR_CONDITION:
+    if plan is not None and known and _flashed_together(plan):
+        unmixing_of(plan, with_colours(rig, colours), channels=CHANNELS)
+    elif known and colours.condition > MOST_COLOUR_CONDITION:
         raise _inseparable(colours)
     return colours
 
@@ -88,11 +102,21 @@ def _measured(
     return np.maximum(level, 0.0), shares.std(axis=0) / np.sqrt(max(len(medians) - 1, 1))
 
 
-def _together(lights: Sequence[Light]) -> tuple[tuple[str, ...], ...]:
-    """Return the lights whose colours must differ: those of each lamp; of lamps with one LED each, any three."""
-    lamps = tuple(lamp for lamp in lamps_of(lights) if len(lamp) > 1)
+def _together(lights: Sequence[Light], seen: Doubles, plan: Plan | None) -> tuple[tuple[tuple[str, ...], ...], bool]:
+    """Return the lights whose colours must differ, in groups, and True: those of each flash of the plan, else of each
+    lamp. Where neither is known, three lights or fewer, or of more the two that are most alike, and False."""
     names = tuple(light.name for light in lights)
-    return lamps or tuple(names[n : n + CHANNELS] for n in range(0, len(names), CHANNELS))
+    flashed = () if plan is None else _flashed_together(plan)
+    lamps = tuple(lamp for lamp in lamps_of(lights) if len(lamp) > 1)
+    if flashed or lamps:
+        return flashed or lamps, True
+    alike = names if len(names) <= CHANNELS else tuple(names[place] for place in most_alike(seen))
+    return (alike,), False
+
+
+def _flashed_together(plan: Plan) -> tuple[tuple[str, ...], ...]:
+    """Return the lights of each flash in which several shine; none of a plan that flashes one light at a time."""
+    return tuple(tuple(flash.lights) for flash in plan.flashes if len(flash.lights) > 1)
 
 
 def _inseparable(found: LedColours) -> PsvideoError:

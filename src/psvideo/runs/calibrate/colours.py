@@ -6,8 +6,11 @@ from pathlib import Path
 from psvideo.calibrate.led_colours import LedColours, measure_led_colours, with_colours
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import said_of
+from psvideo.formats.plan_toml import PLAN_FILE, read_plan
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
+from psvideo.model.irradiance.colours import MOST_COLOUR_CONDITION
+from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.runs.calibrate.flat_field import white_target
 from psvideo.runs.calibrate.reading import check_albedo, pictures_of, reading_of, rig_out
@@ -40,7 +43,8 @@ def colours(
     """Measure what the camera's channels see of every coloured light, on a white card; write the rig with colours.
 
     - ``pictures``: a folder of stills, one per light alone, of plates, or a clip whose plan flashes one light at a
-      time: the card faces the camera, or lies in the plane that the rig gives. ``transfer``, ``plan``, ``frames``,
+      time: the card faces the camera, or lies in the plane that the rig gives. A ``plan`` that flashes several lights
+      at once says which colours must differ; else those of lights in one place must. ``transfer``, ``frames`` and
       ``first_light``: as for ``matte_sphere``.
     - ``rig``: whose directions or positions are known. ``out``: the rig file to write: each light's ``colour``, and its
       intensity in its brightest channel. ``force`` replaces it where it exists.
@@ -56,7 +60,19 @@ def colours(
     known = read_rig(Path(rig), plan_lights=found.names)
     target, ground = white_target(found, known, Path(rig), albedo=albedo, box=box)
     with said_of(pictures):
-        measured = measure_led_colours(found, known, target, ground=ground)
+        measured = measure_led_colours(found, known, target, ground=ground, plan=_plan_of(pictures, plan))
+    if not measured.known and measured.condition > MOST_COLOUR_CONDITION:
+        caller.warn(
+            f"the colours of {' and '.join(measured.together)} are nearly the same (condition number "
+            f"{measured.condition:.3g}), and nothing says which lights flash together: those two must not. Give the "
+            "shoot's `plan`, which says it"
+        )
     made = with_colours(known, measured)
     write_text(rig_path, format_rig(made))
     return ColourCalibration(found=measured, rig=made)
+
+
+def _plan_of(pictures: Path | str, plan: Path | str | None) -> Plan | None:
+    """Return the plan that is given, or that lies beside the pictures."""
+    path = Path(pictures) / PLAN_FILE if plan is None else Path(plan)
+    return read_plan(path) if plan is not None or path.is_file() else None
