@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
+from numpy.typing import NDArray
 from picture_file import read_picture
 
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
@@ -154,6 +155,28 @@ def test_a_light_that_is_off_is_named_and_the_others_are_measured() -> None:
     found = calibrate_lights(sight_spheres([pictures], Looking(), where="ball"))
     assert "no highlight" in found.lights[0].fault
     assert len(found.rig.lights) == 3
+
+
+@pytest.mark.parametrize(("odd", "is_sure"), [((), True), ((0,), True), ((2,), True), ((4,), True), ((0, 2, 4), False)])
+def test_a_reflection_in_one_set_of_several_leaves_no_light_out(odd: tuple[int, ...], is_sure: bool) -> None:
+    """A second spot nearly as bright makes a light doubtful where most of the sets show it."""
+    y, x = np.mgrid[:180, :240]
+    rng = np.random.default_rng(0)
+
+    def picture(*spots: tuple[int, int]) -> NDArray[np.float32]:
+        shown = np.where(np.hypot(x - 120, y - 90) < 60, 0.02, 0.10) + rng.normal(0, 0.002, (180, 240))
+        for strength, (across, down) in zip((0.9, 0.72), spots, strict=False):
+            shown += strength * np.exp(-((x - across) ** 2 + (y - down) ** 2) / 2 / 1.6**2)
+        return np.clip(shown, 0, 1).astype(np.float32)
+
+    first, *others = (135, 85), (105, 80), (120, 110)
+    sets = [
+        light_pictures("abc", [picture(first, *[(140, 110)] * (n in odd)), *map(picture, others)]) for n in range(5)
+    ]
+    looking = Looking(circles=((120.0, 90.0, 60.0),), focal_px=400.0)
+    found = calibrate_lights(sight_spheres(sets, looking, where="ball"))
+    assert [not light.fault for light in found.lights] == [is_sure, True, True]
+    assert is_sure or "several bright spots could be its highlight" in found.lights[0].fault
 
 
 def test_pictures_in_which_the_ball_is_saturated_say_so_and_spoil_no_others() -> None:

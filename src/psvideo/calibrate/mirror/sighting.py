@@ -184,9 +184,9 @@ def _sighting(
 
 def _over_sets(founds: Sequence[FoundHighlight]) -> Highlight:
     """Return the mean place of one light's highlight over sets; frames in which it is elsewhere are left out."""
-    last = founds[-1]
+    last, alike = founds[-1], _alike_in_most(founds)
     spots = [found.highlight for found in founds if found.highlight is not None]
-    rejected = tuple(spot for spot in last.others if spot not in last.alike)
+    rejected = tuple(spot for spot in last.others if spot not in alike)
     if len(spots) * 2 <= len(founds):
         fault = next((found.fault for found in founds if found.fault), "no highlight in most of the frames")
         return Highlight(light=last.light, place=None, sets=len(spots), fault=fault, rejected=last.others)
@@ -203,6 +203,14 @@ def _over_sets(founds: Sequence[FoundHighlight]) -> Highlight:
         radius_px=float(np.mean([spot.radius_px for spot in kept])),
         clipped=any(spot.clipped for spot in kept),
         sets=len(kept),
-        alike=next((found.alike for found in founds if found.alike), ()),
+        alike=alike,
         rejected=rejected,
     )
+
+
+def _alike_in_most(founds: Sequence[FoundHighlight]) -> tuple[Spot, ...]:
+    """Return other spots that could be the highlight, of the last set that shows some, where at least half of the sets
+    in which it was found do; a reflection that is there in one alone is passed over."""
+    doubtful = [found.alike for found in founds if found.alike]
+    found = sum(one.highlight is not None for one in founds)
+    return doubtful[-1] if doubtful and 2 * len(doubtful) >= found else ()
