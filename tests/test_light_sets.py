@@ -196,6 +196,25 @@ def test_photographs_that_lie_in_other_ways_are_not_of_one_place(tmp_path: Path)
         read_images(tmp_path)
 
 
+@pytest.mark.parametrize("dark_says", [True, False])
+def test_ambient_light_is_taken_off_as_each_picture_was_exposed(
+    dark_says: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As for the photographs that ``stills`` solves: with the dark picture as it is, directions were wrong."""
+    for name, value, seconds in (("a", 0.5, 1 / 50), ("b", 0.3, 1 / 100), ("c", 0.4, 1 / 50), ("dark", 0.2, 1 / 25)):
+        exif = Image.Exif()
+        if name != "dark" or dark_says:
+            exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.ExposureTime] = seconds
+        Image.fromarray(np.full((8, 8), round(255 * value), np.uint8)).save(
+            tmp_path / f"{name}.jpg", exif=exif, quality=98
+        )
+    found = read_images(tmp_path, transfer="linear").images[:, 4, 4]
+    times = np.array([0.5, 0.25, 0.5] if dark_says else [1.0, 0.5, 1.0])
+    assert found == pytest.approx(np.array([0.5, 0.3, 0.4]) - 0.2 * times, abs=0.004)
+    assert "the ambient light was scaled by it before it was taken off" in caplog.text
+    assert ("dark.jpg does not say how it was exposed" in caplog.text) is not dark_says
+
+
 @pytest.mark.parametrize(
     ("name", "says", "curve"),
     [

@@ -17,9 +17,10 @@ from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.clip.linear import linear_light
 from psvideo.clip.reading import looks
-from psvideo.clip.stated import stated_by
+from psvideo.clip.stated import relative_exposures, stated_by
 from psvideo.clip.stated_curve import curve_of_pictures
 from psvideo.errors import PsvideoError
+from psvideo.model.arrays import Doubles
 from psvideo.model.camera import Encoding
 from psvideo.model.channels import mean_of_channels
 from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
@@ -85,11 +86,14 @@ def light_pictures(
     images: Sequence[NDArray[np.float32]],
     *,
     ambient: NDArray[np.float32] | None = None,
+    ambient_times: Sequence[float] | Doubles = (),
     ambient_is_off: bool = False,
     saturation: Sequence[float] | None = None,
     seen: NDArray[np.bool_] | None = None,
 ) -> LightPictures:
     """Return pictures of one size as a record; ``ambient`` is taken off, unless that was done before.
+
+    ``ambient_times`` (light,) says how often each picture holds the ambient light, where they were exposed differently.
 
     ``saturation`` (light,) is the value from which on each picture is clipped, with ambient light on it; 1.0 left out.
     """
@@ -99,11 +103,21 @@ def light_pictures(
     clipped = whole >= (CLIPPED_FROM * level).reshape(-1, *[1] * (stacked.ndim - 1)).astype(np.float32)
     return LightPictures(
         names=tuple(names),
-        images=stacked - ambient if ambient is not None and not ambient_is_off else stacked,
+        images=stacked if ambient is None or ambient_is_off else _without(stacked, ambient, ambient_times),
         saturated=clipped,
         seen=np.ones(stacked.shape[:2], np.bool_) if seen is None else seen,
         ambient=ambient,
     )
+
+
+def _without(
+    images: NDArray[np.float32], ambient: NDArray[np.float32], times: Sequence[float] | Doubles
+) -> NDArray[np.float32]:
+    if not len(times):
+        return images - ambient
+    each = np.asarray(times, np.float32).reshape(-1, *[1] * ambient.ndim)
+    less: NDArray[np.float32] = images - each * ambient
+    return less
 
 
 def pictures_of_round(one: Round, *, flashes_s: tuple[float, ...] | None = None) -> LightPictures:
@@ -179,6 +193,19 @@ class LightFiles:
         """How many pictures there are of each light."""
         return min(len(files) for files in self.by_light.values())
 
+    def ambient_at(self, place: int) -> Path:
+        """Return the picture of the ambient light that belongs to a set."""
+        return self.ambient[min(place, len(self.ambient) - 1)]
+
+    def ambient_times(self, place: int) -> tuple[float, ...]:
+        """Return how often each light's picture of a set holds the ambient light of its dark one, by the exposures that
+        the files state; nothing where all are alike, or they do not say."""
+        if not self.ambient or self.ambient_is_off:
+            return ()
+        lights = [stated_by(paths[place]) for paths in self.by_light.values()]
+        relative = relative_exposures(lights, [stated_by(self.ambient_at(place))])
+        return () if relative is None else tuple((relative[:-1] / relative[-1]).tolist())
+
     def curve(self) -> tuple[str, str]:
         """Return the name of the curve by which the first picture of every light codes light, and why: as they say,
         else sRGB for JPEG, and light itself for all other kinds, which calibration is for.
@@ -216,13 +243,16 @@ def read_sets(
             images.append(image)
         dark = None
         if files.ambient:
-            dark, _ = read_picture(files.ambient[min(number, len(files.ambient)) - 1], encoding)
+            dark, _ = read_picture(files.ambient_at(number - 1), encoding)
             if dark.shape != images[0].shape:
                 raise PsvideoError(
                     f"{files.ambient[0]}: shows the ambient light and is not of the size and channels of the other "
                     f"pictures ({shape[0] if shape else ''}). Take it with the same camera and mode."
                 )
-        yield light_pictures(files.names, images, ambient=dark, ambient_is_off=files.ambient_is_off)
+        times = files.ambient_times(number - 1)
+        yield light_pictures(
+            files.names, images, ambient=dark, ambient_times=times, ambient_is_off=files.ambient_is_off
+        )
 
 
 def read_picture(path: Path, encoding: Encoding = Encoding()) -> tuple[NDArray[np.float32], str]:

@@ -8,6 +8,7 @@ import contextlib
 import io
 import struct
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from psvideo.model.turn import EXIF, UPRIGHT, Turn
 LIKE = 0.02
 """A profile's curve is one of those that have a name where it is nowhere further from it than this share of white."""
 WIDTH_35_MM = 36.0
+OTHER_EXPOSURE = 1.05
+"""Exposures that differ by this factor were not meant to be the same."""
 SIGNALS = np.linspace(0, 1, 65)
 
 
@@ -71,6 +74,22 @@ def stated_by(path: Path) -> Stated:
             camera=_camera(taken),
         )
     return found
+
+
+def relative_exposures(lights: Sequence[Stated], dark: Sequence[Stated] = ()) -> Doubles | None:
+    """Return by how much more than the usual picture of a light each one was exposed, (picture,), those of the dark
+    last, 1 where they do not say; None where the lights' do not all say it, or all are alike."""
+    known = np.array([one.exposure for one in lights if one.exposure is not None])
+    if not len(known) or len(known) < len(lights):
+        return None
+    usual = float(np.median(known))
+    relative = np.append(known, [one.exposure or usual for one in dark]) / usual
+    return relative if are_uneven(relative) else None
+
+
+def are_uneven(exposures: Doubles) -> bool:
+    """Return whether exposures are not all alike."""
+    return bool(exposures.max() >= OTHER_EXPOSURE * exposures.min())
 
 
 def _above_0(value: Any, factor: float = 1.0) -> float | None:

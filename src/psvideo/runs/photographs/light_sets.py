@@ -25,6 +25,7 @@ from psvideo.calibrate.light_pictures import (
 from psvideo.calibrate.still_places import Place
 from psvideo.clip import Take
 from psvideo.clip.folder import MOVIES
+from psvideo.clip.stated import relative_exposures, stated_by
 from psvideo.clip.transfer import find_curve
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
@@ -192,8 +193,28 @@ def _of_files(files: LightFiles, planned: Encoding | None, reading: Reading) -> 
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
     room = None if files.room is None else read_picture(files.room, read)[0]
     return LightSets(
-        name=files.folder.resolve().name, names=files.names, sets=sets, room=room, warnings=aside, notes=notes
+        name=files.folder.resolve().name,
+        names=files.names,
+        sets=sets,
+        room=room,
+        warnings=(*aside, *_uneven(files)),
+        notes=notes,
     )
+
+
+def _uneven(files: LightFiles) -> tuple[str, ...]:
+    """Say where photographs were exposed differently, and what was made of it."""
+    stated = [stated_by(paths[0]) for paths in files.by_light.values()]
+    relative = relative_exposures(stated)
+    times = files.ambient_times(0)
+    said = []
+    if relative is not None:
+        said.append("strengths that are measured are those of these exposures, not of the lights alone")
+    if times:
+        said.append("the ambient light was scaled by it before it was taken off")
+        if stated_by(files.ambient_at(0)).exposure is None:
+            said.append(f"{files.ambient_at(0).name} does not say how it was exposed, and is taken for a usual one")
+    return (f"{files.folder}: by their EXIF the pictures were exposed differently: {'; '.join(said)}",) if said else ()
 
 
 def _kind(path: Path) -> str:

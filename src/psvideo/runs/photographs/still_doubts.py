@@ -14,6 +14,7 @@ from psvideo.clip.decode.decoders import opened, read_header
 from psvideo.clip.folder import KINDS
 from psvideo.clip.in_file import RowsInFile
 from psvideo.clip.reading import looks
+from psvideo.clip.stated import are_uneven, relative_exposures
 from psvideo.clip.stills import Photographs
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.model.arrays import Doubles
@@ -43,7 +44,6 @@ IN_CODES = 0.98
 """Another assumption is named only where, in the pictures' codes, it leaves less than this share of
 what is left: where a surface bends little, every curve explains it, and in light that is a straight line of codes their
 noise is less. (Linear pictures that were read as sRGB: 0.29 to 0.96; sRGB as it is: 1.00 and more.)"""
-OTHER_EXPOSURE = 1.05
 ALIKE, NEARLY_ALL, LEAST_AMBIENT = 0.02, 0.99, 0.05
 """A picture of the room's light is brighter than no other by more than noise of 8 bits, at nearly all of its pixels,
 and brighter than black: this share of a typical signal."""
@@ -185,18 +185,20 @@ def exposures_of(
     """Return by how much more each picture, the dark one last, was exposed than the usual one of ``count`` lights; None
     where all are alike or their files cannot be believed. With what to note, and what to warn of."""
     named = [one.exposure for one in pictures.stated]
-    known = np.array([one for one in named[:count] if one is not None])
-    if len(known) < count:
-        some = len(known) and f"Only {len(known)} of {count} pictures say how they were exposed; none is scaled."
-        return None, some or None, None
-    lights = known / np.median(known)
-    relative = np.append(lights, [(one or np.median(known)) / np.median(known) for one in named[count:]])
-    if not _differ(relative):
-        return None, None, None
+    known = sum(one is not None for one in named[:count])
+    relative = relative_exposures(pictures.stated[:count], pictures.stated[count:])
+    if relative is None:
+        some = 0 < known < count
+        return (
+            None,
+            f"Only {known} of {count} pictures say how they were exposed; none is scaled." if some else None,
+            None,
+        )
+    lights = relative[:count]
     odd = pictures.files[int(np.argmax(np.abs(np.log(relative))))].name
     times = float(np.exp(np.abs(np.log(relative)).max()))
     said = f"By their EXIF the pictures were exposed differently ({odd} by a factor {times:.2g} from the usual)"
-    scaled = "their lights' strengths were" if _differ(lights) else "the ambient light was"
+    scaled = "their lights' strengths were" if are_uneven(lights) else "the ambient light was"
     silent = None
     if None in named:
         silent = (
@@ -207,7 +209,7 @@ def exposures_of(
     if glance is None or np.isnan(plain):
         return relative, f"{said}; {scaled} scaled by it.", silent
     left = glance.exposed(relative).left_over(pictures.transfer)
-    if left < (plain if _differ(lights) else plain / CLEARLY):  # a dim room says little of the dark picture alone
+    if left < (plain if are_uneven(lights) else plain / CLEARLY):  # a dim room says little of the dark picture alone
         return relative, f"{said}, and the pictures agree: {scaled} scaled by it.", silent
     return (
         None,
@@ -215,7 +217,3 @@ def exposures_of(
         f"{said}, but the pictures do not show it: scaled by it, {100 * left:.1f} % of the light is left over, and "
         f"{100 * plain:.1f} % as they are. EXIF was not believed; check whether the files were developed or edited.",
     )
-
-
-def _differ(exposures: Doubles) -> bool:
-    return bool(exposures.max() >= OTHER_EXPOSURE * exposures.min())
