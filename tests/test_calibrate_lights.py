@@ -103,6 +103,18 @@ def test_a_matte_sphere_shows_directions_and_intensities_per_channel(focal_px: f
     assert all(0.1 < light.error_deg < 1.5 for light in found), "half a pixel on a marked outline"
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0, 90.0, 200.0])
+def test_a_drawn_out_outline_ends_where_the_sphere_turns_away(turn_deg: float) -> None:
+    """As on a mirror: at a share of the way to the rim, the normal leans by that share."""
+    view, place = SphereView(focal_px=None, principal_px=(99.5, 74.5)), np.array([95.0, 72.0, 60.0, 0.04, -0.03])
+    turn = np.radians(turn_deg)
+    way = np.array([np.cos(turn), np.sin(turn)])
+    rim = 60.0 * (1 + 0.04 * np.cos(2 * turn) - 0.03 * np.sin(2 * turn))
+    shares = np.array([0.3, 0.7, 0.98])
+    normals, _ = sphere_normals(view, place, place[:2] + shares[:, None] * rim * way)
+    np.testing.assert_allclose(normals[:, :2], shares[:, None] * way * [1, -1], atol=1e-9)
+
+
 def test_gloss_and_saturation_are_weighed_out_of_a_matte_sphere() -> None:
     directions, strengths = ways(4), np.full((4, 3), 1.5)
     glossy = sphere_pictures(directions, strengths, gloss=0.8)
@@ -392,6 +404,12 @@ def test_a_calibration_that_failed_is_repeated_without_force(
     capsys.readouterr()
     assert main([*words, "--circle", "95.3,71.8,60"]) == 0
     assert main([*words, "--circle", "95.3,71.8,60"]) == 2, "a picture that belongs to a rig stays"
+    before = rig.read_bytes(), rig.with_suffix(".png").read_bytes()
+    capsys.readouterr()
+    assert main([*words, "--circle", "30,30,20", "--force"]) == 1
+    assert (rig.read_bytes(), rig.with_suffix(".png").read_bytes()) == before, "and stays where a repetition fails"
+    assert f"See {rig.with_suffix('.failed.png')}." in capsys.readouterr().err
+    assert rig.with_suffix(".failed.png").exists()
     rig.unlink()
     rig.with_suffix(".png").write_bytes(b"somebody's own")
     assert main(words) == 2

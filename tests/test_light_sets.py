@@ -270,6 +270,17 @@ def test_a_second_picture_of_the_dark_or_of_the_room_is_named(tmp_path: Path, ca
     assert "room.png: is assumed to be no light's picture and left aside" in caplog.text
 
 
+def test_ambient_light_is_that_of_the_same_round(tmp_path: Path) -> None:
+    """Of the lights, rounds count that all of them have."""
+    for light, values in (("key", {1: 0.9, 2: 0.5, 3: 0.5}), ("left", {2: 0.6, 3: 0.6}), ("dark", {1: 0.4, 2: 0.2})):
+        for number, value in values.items():
+            still(tmp_path / light / f"x_{light}.{number:04d}.png", value)
+    found = find_plates(tmp_path)
+    assert found is not None
+    assert [file.name for file in found.ambient] == ["x_dark.0002.png", "x_dark.0002.png"]
+    assert read_images(tmp_path).images[:, 0, 0] == pytest.approx([0.3, 0.4], abs=1e-4)
+
+
 def test_a_second_folder_of_the_dark_is_no_light(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     for name in ("key", "left", "ambient", "dark"):
         still(tmp_path / name / "1.png", 0.1 if name == "ambient" else 0.4)

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
@@ -40,10 +40,11 @@ def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | Non
         )
     names = [name for name in order if name in held] or list(held)
     made_by_split = (folder / TIMING).is_file()
+    by_light = _side_by_side({_checked(name, folder / name): held[name] for name in names})
     return LightFiles(
         folder=folder,
-        by_light=_side_by_side({_checked(name, folder / name): held[name] for name in names}),
-        ambient=tuple(every[dark[0]]) if dark else (),
+        by_light=by_light,
+        ambient=_of_the_same_rounds(every[dark[0]], by_light) if dark else (),
         ambient_is_off=made_by_split,
         room=every[room[0]][0] if room else None,
         left_aside=tuple(folder / name for name in (*(name for name in held if name not in names), *odd)),
@@ -170,6 +171,17 @@ def _side_by_side(held: dict[str, list[Path]]) -> dict[str, tuple[Path, ...]]:
     if shared:
         return {light: tuple(by_number[n] for n in shared) for light, by_number in zip(held, numbers, strict=True)}
     return {light: tuple(files) for light, files in held.items()}
+
+
+def _of_the_same_rounds(ambient: list[Path], by_light: Mapping[str, tuple[Path, ...]]) -> tuple[Path, ...]:
+    """Return pictures of the ambient light beside those of the lights: of the number nearest to theirs, where lights'
+    pictures of one round share one, else as they are."""
+    rounds = [{number_of(file) for file in files} for files in zip(*by_light.values(), strict=False)]
+    numbers = [number for one in rounds for number in one if len(one) == 1 and number is not None]
+    dark = {number: file for file in ambient if (number := number_of(file)) is not None}
+    if not dark or len(numbers) < len(rounds):
+        return tuple(ambient)
+    return tuple(dark[min(dark, key=lambda other: abs(other - number))] for number in numbers)
 
 
 def _timed_lights(folder: Path) -> tuple[str, ...]:

@@ -107,7 +107,7 @@ def sphere_normals(view: SphereView, place: Doubles, points: Doubles) -> tuple[D
     The cosine between normal and the ray back is 0 or less where the ray misses.
     """
     centre, radius = view.sphere(place)
-    origins, directions = view.rays(points)
+    origins, directions = view.rays(view.unstretched(points, place))
     along = ((centre - origins) * directions).sum(axis=1)
     gap = radius**2 - ((origins + along[:, None] * directions - centre) ** 2).sum(axis=1)
     met = origins + (along - np.sqrt(np.maximum(gap, 0)))[:, None] * directions

@@ -115,11 +115,7 @@ class SphereView:
         That direction leads to the light whose highlight the point is. None where the ray misses the sphere.
         """
         centre, radius = self.sphere(outline)
-        point = np.asarray(point, np.float64)
-        if self.focal_px is None:
-            away = point - outline[:2]
-            point = outline[:2] + away / _stretch(away[None], outline)[0]
-        origins, directions = self.rays(point[None])
+        origins, directions = self.rays(self.unstretched(np.asarray(point, np.float64)[None], outline))
         origin, ray = origins[0], directions[0]
         along = float(ray @ (centre - origin))
         gap = radius**2 - float(np.sum((origin + along * ray - centre) ** 2))
@@ -128,6 +124,15 @@ class SphereView:
         met = origin + (along - np.sqrt(gap)) * ray
         normal = (met - centre) / radius
         return met, ray - 2 * (ray @ normal) * normal
+
+    def unstretched(self, points: Doubles, outline: Doubles) -> Doubles:
+        """Return where points (point, 2) of an outline's sphere would lie if the outline were a circle: parallel rays
+        know no other way in which it is drawn out."""
+        if self.focal_px is not None:
+            return points
+        away = points - outline[:2]
+        circular: Doubles = outline[:2] + away / _stretch(away, outline)[:, None]
+        return circular
 
     def off_axis_deg(self, point: Vector | Doubles, focal_px: float | None = None) -> float:
         """Return the angle between the lens's axis and the ray through a point, with this focal length or another."""

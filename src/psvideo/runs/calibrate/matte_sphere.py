@@ -15,7 +15,14 @@ from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
 from psvideo.pictures.matte_sphere import matte_picture
-from psvideo.runs.calibrate.reading import check_albedo, picture_beside, pictures_of, reading_of, rig_out
+from psvideo.runs.calibrate.reading import (
+    check_albedo,
+    picture_beside,
+    picture_of_failure,
+    pictures_of,
+    reading_of,
+    rig_out,
+)
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 
@@ -58,7 +65,7 @@ def matte_sphere(
     no light can be measured.
     """
     rig_path = rig_out(out, force=force)
-    picture = picture_beside(rig_path, force=force)
+    picture, of_failure = picture_beside(rig_path, force=force), picture_of_failure(rig_path)
     looking = Looking(focal_px=focal_px, circles=() if circle is None else (circle,))
     if albedo is not None:
         check_albedo(albedo)
@@ -72,10 +79,11 @@ def matte_sphere(
     )
     lights = measure_matte_sphere(found, outline, albedo=albedo)
     rig = matte_rig(lights, view)
-    write_png(picture, matte_picture(found, outline, lights))
+    shown = matte_picture(found, outline, lights)
+    write_png(picture if rig.lights else of_failure, shown)
     if not rig.lights:
         faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
-        raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {picture}.")
+        raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {of_failure}.")
     write_text(rig_path, format_rig(rig))
     if doubt:
         caller.warn(f"{pictures}: {doubt}")

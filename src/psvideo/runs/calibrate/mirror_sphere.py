@@ -15,7 +15,7 @@ from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
-from psvideo.runs.calibrate.reading import picture_beside, reading_of, rig_out
+from psvideo.runs.calibrate.reading import picture_beside, picture_of_failure, reading_of, rig_out
 from psvideo.runs.photographs.light_sets import Reading, sets_of
 from psvideo.runs.steps.caller import PYTHON, Caller
 
@@ -47,7 +47,7 @@ def mirror_sphere(
 
     - ``pictures``: one folder of stills (one per light), of plates, or clip, for each place of the sphere.
       ``transfer``, ``plan``, ``frames``, ``first_light``: as for ``matte_sphere``.
-    - ``out``: the rig file to write; ``force`` replaces it and the picture where they exist.
+    - ``out``: the rig file to write; ``force`` replaces it and the picture where they exist, unless this fails.
     - ``circle``: outlines found by hand: x, y and radius in pixels. ``spheres``: how many each picture holds.
       ``outline_picture``: a picture from the same camera, room light on, on which the outline shows.
     - ``focal_px``: the focal length in pixels; or ``focal_mm`` with ``sensor_mm``, the width of the sensor's part that
@@ -58,7 +58,7 @@ def mirror_sphere(
     found (the picture shows what was looked at) or nothing can be measured.
     """
     rig_path = rig_out(out, force=force)
-    picture = picture_beside(rig_path, force=force)
+    picture, of_failure = picture_beside(rig_path, force=force), picture_of_failure(rig_path)
     looking = replace(looking_for(spheres, circle, focal_px, focal_mm, sensor_mm), principal_px=principal_px)
     radius_m = radius_in_m(radius_mm)
     reading = reading_of(plan, frames, first_light, transfer)
@@ -66,8 +66,8 @@ def mirror_sphere(
     try:
         sightings = _sightings([Path(path) for path in pictures], reading, looking, room, watch, caller)
     except SphereNotFoundError as fault:
-        write_png(picture, faulty_picture(fault.picture))
-        raise PsvideoError(f"{fault} See {picture}.") from None
+        write_png(of_failure, faulty_picture(fault.picture))
+        raise PsvideoError(f"{fault} See {of_failure}.") from None
     found = calibrate_lights(sightings, radius_m=radius_m)
     write_png(picture, sphere_picture(found))
     write_text(rig_path, format_rig(found.rig))

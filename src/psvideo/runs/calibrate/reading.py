@@ -33,6 +33,14 @@ def picture_beside(out: Path, *, force: bool) -> Path:
     return path
 
 
+def picture_of_failure(out: Path) -> Path:
+    """Return where the picture of a calibration that fails goes: beside a rig that stays, its own stays as well. Raises
+    UsageError where it may not be replaced."""
+    path = out.with_suffix(".failed.png" if out.exists() else ".png")
+    refuse_existing(path, force=True, mark=PICTURE_MARK)
+    return path
+
+
 def reading_of(plan: Path | str | None, frames: str | None, first_light: str | None, transfer: str | None) -> Reading:
     """Return how pictures are to be read. Raises UsageError where the curve named is not known."""
     check_transfer(transfer)
