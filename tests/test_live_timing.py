@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from live_shots import LIVE_ROWS, apart_rows, plates_of, shoot, taken
 from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
@@ -20,13 +21,10 @@ from psvideo.model.plan import Plan
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
-from psvideo.synth import Exposure, Noise, TrueClock, expose
+from psvideo.synth import Exposure, TrueClock
 from psvideo.synth.lamps.true_flashes import TrueFlash
 
 PlanMaker = Callable[..., Plan]
-FRAMES = 150
-LIVE_ROWS = 0.05
-"""So far may live and offline be apart, in rows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,19 +37,6 @@ class Followed:
     @property
     def timing(self) -> Timing:
         return timing_of([self.follower], clip="clip")
-
-
-def plates_of(plan: Plan) -> dict[int, np.ndarray]:
-    rng = np.random.default_rng(3)
-    shape = plan.camera.height_px, plan.camera.width_px
-    return {slot: (0.05 + 0.3 * rng.random(shape)).astype(np.float32) for slot in plan.lit_slots}
-
-
-def shoot(plan: Plan, *, frames: int = FRAMES, clock: TrueClock | None = None, **options: object) -> Exposure:
-    plates = options.pop("plates", plates_of(plan))
-    clock = clock or TrueClock(phase_s=0.0123, offset_ppm=30.0)
-    noise = Noise(full_well_e=20_000, read_e=8)
-    return expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, **options)  # type: ignore[arg-type]
 
 
 def profiles_of(shot: Exposure) -> Doubles:
@@ -67,13 +52,6 @@ def followed(plan: Plan, values: Doubles) -> Followed:
         if follower.state != states[-1][1]:
             states.append((number, follower.state))
     return Followed(follower=follower, states=states)
-
-
-def apart_rows(one: Timing, start_s: Doubles, plan: Plan) -> Doubles:
-    """Return how far every flash is from the nearest that starts at ``start_s``, in rows."""
-    nearest = np.abs(start_s[:, None] - one.start_s).argmin(axis=0)
-    apart: Doubles = (one.start_s - start_s[nearest]) / plan.camera.row_time_s
-    return apart
 
 
 def switched_off(plan: Plan, slot: int, at_s: float) -> Callable[[TrueFlash], np.ndarray | None]:
@@ -185,12 +163,6 @@ def test_a_synced_plan_is_refused_in_one_paragraph(make_plan: PlanMaker) -> None
 
 
 UNMARKED = {"lights": ("key", "left", "right", "top"), "dark": False, "width_px": 8, "height_px": 96}
-
-
-def taken(chain: Chain, images: list[np.ndarray]) -> Chain:
-    for index, image in enumerate(images):
-        chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
-    return chain
 
 
 def test_names_after_a_second_lock_are_a_guess_and_said_to_be(make_plan: PlanMaker) -> None:

@@ -235,7 +235,7 @@ class Chain:
                 return
             self._idle.clear()
             index = np.array([one[0] for one in fresh], np.int64)
-            known = sum(follower.missing_before(fresh[0][0]) for follower in self.followed)
+            known = sum(follower.later_at(fresh[0][0]) for follower in self.followed)
             values = np.stack([one[1] for one in fresh])
             doubts = _stacked([one[2] for one in fresh], values)
             first_light = self.first_light if index[0] == self._first else None  # it speaks of the first frames alone
@@ -271,13 +271,13 @@ class Chain:
             self.why = ""
             for before in self.followed:  # what it took for missing in the frames that were searched is known better
                 self.lost_frames -= before.missing_before(self._last or 0) - before.missing_before(numbers[0])
-                before.holes[:] = [hole for hole in before.holes if hole.before <= numbers[0]]
+                before.forget_after(numbers[0])
             self.lost_frames += follower.missing_before(self._last or 0)
             self.follower = follower
             self.followed.append(follower)
             if self._ring is not None and len(self.followed) == 1:
                 taken = [*numbers, *(one[0] for one in later)]
-                self._ring.moved({number: number + follower.missing_before(number) for number in taken})
+                self._ring.moved({number: number + follower.later_at(number) for number in taken})
             elif self._ring is not None:
                 self._ring.frames.clear()
 

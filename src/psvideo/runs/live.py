@@ -15,7 +15,7 @@ from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
-from psvideo.live.following.history import timing_of
+from psvideo.live.followed_timing import followed_timing
 from psvideo.live.following.lock import check_followed
 from psvideo.live.incoming.recording import FIRST_NUMBER, recorded_words, recording
 from psvideo.live.incoming.source import LiveSource
@@ -31,7 +31,7 @@ from psvideo.model.choices import Pace
 from psvideo.model.first_light import check_first_light
 from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.rig import Rig
-from psvideo.model.timing import DroppedFrames, Timing, timed_camera
+from psvideo.model.timing import timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.on_set.live_rehearsal import rehearse
@@ -140,12 +140,10 @@ def live(
         whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
         raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
     if timing_path is not None:
-        kept = (
-            played
-            if record_path is None
-            else replace(played, name=record_path.resolve().name, first_number=FIRST_NUMBER)
-        )
-        write_text(timing_path, format_timing(_timing(running.chain, kept)))
+        name, first = played.name, played.first_number
+        if record_path is not None:
+            name, first = record_path.resolve().name, FIRST_NUMBER
+        write_text(timing_path, format_timing(followed_timing(running.chain, clip=name, first_number=first)))
     return summary
 
 
@@ -242,15 +240,3 @@ def _running(
     quality = first_quality(camera.width_px, camera.height_px, mosaic=source.cfa is not None)
     chain = Chain(plan=source.plan, cfa=source.cfa, rig=rig, first_light=first_light, step=quality.step)
     return Running(chain=chain, source=source, quality=quality, shown=shown, said=said, seconds=seconds)
-
-
-def _timing(chain: Chain, source: LiveSource) -> Timing:
-    """Return the timing of all that was followed, frames named by their files' numbers."""
-    missing = dict(chain.gaps)
-    came_before = {at + count: at for at, count in chain.gaps.items()}
-    for follower in chain.followed:
-        for hole in follower.holes:
-            after = came_before.get(hole.before - 1, hole.before - 1)
-            missing[after] = missing.get(after, 0) + hole.count
-    dropped = [DroppedFrames(after=at + source.first_number, count=count) for at, count in sorted(missing.items())]
-    return timing_of(chain.followed, clip=source.name, dropped=dropped, first_light=chain.first_light)

@@ -59,9 +59,10 @@ class Hole:
 class Follower:
     """Follows one lock. ``extra`` is by how many frames the picture says that frames come later than numbered.
 
-    ``measured`` is what windows of frames said of the clock, against the lock's own, ``span`` the places in time of the
-    first and the last frame that were followed; ``doubted_from`` is the place from which it is not known whether they
-    show this strobe, None while it is locked.
+    ``holes`` are frames that are missing without a word, ``repeated`` the numbers of those that show the same moment
+    as the one before them. ``measured`` is what windows of frames said of the clock, against the lock's own, ``span``
+    the places in time of the first and the last frame that were followed; ``doubted_from`` is the place from which it
+    is not known whether they show this strobe, None while it is locked.
     """
 
     plan: Plan
@@ -74,6 +75,7 @@ class Follower:
     span: tuple[int, int] | None = None
     doubted_from: int | None = None
     holes: list[Hole] = field(default_factory=list)
+    repeated: list[int] = field(default_factory=list)
     measured: list[Measured] = field(default_factory=list)
     trims: Trims = field(default_factory=Trims)
     share: float = 1.0
@@ -102,6 +104,16 @@ class Follower:
     def missing_before(self, number: int) -> int:
         """Return how many frames were found missing before a numbered one."""
         return sum(hole.count for hole in self.holes if hole.before <= number)
+
+    def later_at(self, number: int) -> int:
+        """Return by how many frames this lock has a numbered one later than the lock's first: less than none where
+        more are repeated than missing."""
+        return self.missing_before(number) - sum(again <= number for again in self.repeated)
+
+    def forget_after(self, number: int) -> None:
+        """Forget which frames beyond a number are missing or repeated: another lock knows better."""
+        self.holes[:] = [hole for hole in self.holes if hole.before <= number]
+        self.repeated[:] = [again for again in self.repeated if again <= number]
 
     def trimmed(self, at_s: float, ppm: float) -> None:
         """Foresee that the strobe, from a time on, comes later by this many ppm of the time that passes."""
@@ -157,7 +169,7 @@ class Follower:
         if not self.holes or self._light is None:
             return False
         hole = self.holes[-1]
-        first = hole.before + self.extra
+        first = hole.before + self.extra + sum(again > hole.before for again in self.repeated)
         since = sum(frame.index >= first for frame in self.window.frames)
         if not EVERY <= since < len(self.window.frames) or not self._is_astray(since):
             return False
@@ -272,7 +284,8 @@ def caught_up(
     """Return what follows the strobe after the frames that the lock was found in, whose profiles these are.
 
     ``numbers`` are the frames' own (left out: their places in time): where the lock has frames come later than these
-    say, and later than those before, frames are missing, as where the follower finds it.
+    say, and later than those before, frames are missing, as where the follower finds it; a frame that has the place of
+    the one before repeats it.
     """
     follower, places = following(plan, lock), lock.places.tolist()
     numbers = places if numbers is None else numbers
@@ -282,6 +295,7 @@ def caught_up(
         follower.extra += more
         if more > 0:
             follower.holes.append(Hole(before=number, count=more))
+        follower.repeated.extend([number] * -more)
         follower.add(number, value, doubt)
     return follower
 

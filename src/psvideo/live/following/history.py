@@ -28,12 +28,13 @@ def timing_of(
     *,
     clip: str,
     dropped: Sequence[DroppedFrames] = (),
+    repeated: Sequence[int] = (),
     first_light: str | None = None,
 ) -> Timing:
     """Return the timing of all that was followed, one lock after the other; every moment by all that was measured.
 
-    ``first_light`` is what named the first lock's lights, where anybody did. Raises ValueError where nothing was
-    followed.
+    ``dropped`` and ``repeated`` are the clip's frames, by its files' numbers; ``first_light`` is what named the first
+    lock's lights, where anybody did. Raises ValueError where nothing was followed.
     """
     flashes: list[Flash] = []
     beat = followed[-1].beat
@@ -48,6 +49,7 @@ def timing_of(
     return replace(
         _timing(followed[-1], numbered, beat, clip=clip),
         dropped_frames=tuple(dropped),
+        repeated_frames=tuple(repeated),
         order=order_of(followed),
         order_note=guess_words(followed, first_light=first_light),
     )

@@ -1,0 +1,68 @@
+"""Frames by their numbers and by their places in time: what the live timing says of both holds together."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from live_shots import LIVE_ROWS, apart_rows, shoot, taken
+
+from psvideo.live.chain import Chain
+from psvideo.live.followed_timing import followed_timing
+from psvideo.model.plan import Plan
+from psvideo.model.timing import places_in_time
+
+PlanMaker = Callable[..., Plan]
+FIRST = 1001
+
+
+def hold_together(plan: Plan, course: list[int], *, dark: int = 0) -> Chain:
+    """Film a strobe and take the frames that a course names, after some dark ones: every frame of the file is placed
+    where it was, seen from the flashes of the same file."""
+    shot = shoot(plan, frames=max(course) + 1)
+    shape = plan.camera.height_px, plan.camera.width_px
+    nothing = np.random.default_rng(1).normal(0, 1e-4, (dark, *shape)).astype(np.float32)
+    chain = taken(Chain(plan=plan), [*nothing, *(shot.frames[at] for at in course)])
+    assert chain.state == "locked"
+    timing = followed_timing(chain, clip="clip", first_number=FIRST)
+    numbers = range(FIRST, FIRST + dark + len(course))
+    places = places_in_time(timing, list(numbers))
+    late = {places[number] - at for number, at in zip(numbers[dark:], course, strict=True) if number in places}
+    assert len(late) == 1
+    true_s = np.array([flash.start_s for flash in shot.flashes]) + late.pop() * plan.camera.frame_period_s
+    whole = replace(
+        timing, flashes=tuple(one for one in timing.flashes if one.complete and one.start_s > true_s[0] - 1e-4)
+    )
+    assert len(whole.flashes) > 0.8 * len(shot.flashes)
+    assert np.abs(apart_rows(whole, true_s, plan)).max() < LIVE_ROWS
+    return chain
+
+
+@pytest.mark.parametrize("again", [(20,), (35,), (12, 30), (20, 20)])
+def test_a_frame_that_the_finder_sees_twice_is_repeated_in_the_timing_and_delays_nothing(
+    make_plan: PlanMaker, again: tuple[int, ...]
+) -> None:
+    plan = make_plan(width_px=8, height_px=96)
+    course = sorted([*range(110), *again])
+    chain = hold_together(plan, course)
+    twice = [number for number in range(1, len(course)) if course[number] == course[number - 1]]
+    timing = followed_timing(chain, clip="clip", first_number=FIRST)
+    assert timing.repeated_frames == tuple(number + FIRST for number in twice)
+    assert timing.dropped_frames == ()
+    assert chain.lost_frames == 0
+
+
+@pytest.mark.parametrize("dark", [5, 12])
+def test_dark_frames_before_the_strobe_starts_are_counted_alike_by_numbers_and_by_flashes(
+    make_plan: PlanMaker, dark: int
+) -> None:
+    hold_together(make_plan(width_px=8, height_px=96), list(range(110)), dark=dark)
+
+
+def test_a_repeated_frame_and_missing_ones_are_told_apart(make_plan: PlanMaker) -> None:
+    course = [at for at in sorted([*range(140), 15]) if at not in (60, 90)]
+    chain = hold_together(make_plan(width_px=8, height_px=96), course)
+    assert chain.lost_frames == 2
+    timing = followed_timing(chain, clip="clip", first_number=FIRST)
+    assert timing.repeated_frames == (FIRST + 16,)
+    assert [hole.after for hole in timing.dropped_frames] == [FIRST + 60, FIRST + 89]
