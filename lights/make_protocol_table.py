@@ -81,7 +81,7 @@ def _boards(table: dict[str, Any]) -> Iterator[str]:
             if isinstance(value, dict):
                 yield from (f"#define {key.upper()}_{wiring.upper()} {count}" for wiring, count in value.items())
             else:
-                yield f"#define {key.upper()} {value}UL"
+                yield f"#define {key.upper()} {int(value)}UL"
         yield "#endif"
 
 

@@ -35,6 +35,8 @@ from psvideo.runs.on_set.live_strobe import held_strobe
 from psvideo.runs.steps.caller import PYTHON
 from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
+from psvideo.strobe.link.lines import Error
+from psvideo.strobe.link.requests import Trim
 from psvideo.strobe.runlog import RunLog, as_played, format_log
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 from psvideo.sync.rowfit.beat import FoundClock
@@ -145,6 +147,54 @@ def test_a_trim_that_the_board_refuses_leaves_the_one_before_and_says_why(make_p
     assert (holding.ppm, holding.note) == (0, "dark < 2 min_dark")
     assert loop.chain.follower is not None
     assert loop.chain.follower.trims.ppm == []
+
+
+@pytest.mark.parametrize("code", [Error.RANGE, Error.COMMAND, Error.FAULT])
+def test_whatever_a_board_refuses_a_trim_for_it_plays_on(make_plan: PlanMaker, code: Error) -> None:
+    def refuse(request: object) -> object:
+        raise RefusedError("no", code=code)
+
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=lambda at_s: 900.0)
+    holding = replace(holding_of(loop, "30"), ask=refuse)
+    assert not holding._trimmed(100)
+    assert (holding.ppm, holding.most_ppm, holding.note) == (0, 0, "no")
+
+
+def test_a_trim_whose_answer_was_lost_is_counted_and_asked_for_again(make_plan: PlanMaker) -> None:
+    """The board has it, and refuses to take it a second time before it counts."""
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=lambda at_s: 0.0)
+    holding = holding_of(loop, "30")
+    asked: list[Trim] = []
+
+    def lost_once(trim: Trim) -> object:
+        asked.append(trim)
+        if len(asked) == 1:
+            raise RefusedError("running", code=Error.STATE)
+        return trim
+
+    holding = replace(holding, ask=lost_once)
+    assert not holding._trimmed(-700)
+    assert (holding.ppm, holding.most_ppm) == (0, 700)
+    holding.beat(10.0)
+    assert asked == [trim_by(-700), trim_by(0)], "nothing is followed, so none is wanted, and the board may have one"
+    holding.beat(20.0)
+    assert len(asked) == 2
+    assert (holding.ppm, holding.most_ppm, holding.note) == (0, 700, "")
+
+
+def test_a_board_that_takes_no_trims_is_refused_before_it_flashes(
+    make_plan: PlanMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port, path = PythonBoardPort(BOARDS["rp2040"]), tmp_path / "plan.toml"
+    monkeypatch.setattr("psvideo.runs.strobe.port._open", lambda *_: port)
+    path.write_text(format_plan(held_plan(make_plan)))
+    held = held_strobe(
+        Chain(plan=held_plan(make_plan)), path, lock="edge", port="emulated", yes=True, noted=print, caller=PYTHON
+    )
+    with pytest.raises(UsageError, match=r"rp2040, takes no trims.*atmega328p, atmega2560"), held:
+        pass
+    assert port._controller.state == "idle"
+    assert port._controller.feed(b"STAT\n", port._now()).split()[-1] == b"cycles=0"
 
 
 def test_what_cannot_be_held_is_refused_in_one_paragraph(make_plan: PlanMaker) -> None:

@@ -197,6 +197,14 @@ def test_the_pico_has_direct_wiring_only_and_the_uno_both() -> None:
     assert b"wiring=direct lines=2 powers=2" in uno.feed(b"CAPS\n", 0)
 
 
+def test_the_pico_takes_no_trim_but_none() -> None:
+    pico = PythonBoard(BOARDS["rp2040"])
+    arm = b"ARM %d\n" % cycle_check([Slot(slot=0, duration=1000, dark=10**6, period=1000, lit=())])
+    tell(pico, b"SLOT 0 1000 1000000 1000\n", b"STEPS 0 0\n", arm, b"RUN 0\n", now=0)
+    assert pico.feed(b"TRIM sooner 1\n", 10**6).startswith(b"E 7 ")
+    assert pico.feed(b"TRIM later 0\n", 2 * 10**6) == b"OK way=later ppm=0\n"
+
+
 def test_an_answer_has_a_checksum_where_the_request_had_one() -> None:
     controller = PythonBoard(BOARDS["atmega328p"])
     assert (

@@ -191,6 +191,17 @@ def test_unplugged_in_the_middle_is_one_paragraph_and_is_logged(board: Board, pr
     assert not board.controller.lit
 
 
+def test_a_request_that_is_refused_in_the_middle_is_no_broken_link(board: Board, program: Program) -> None:
+    def refused(progress: RunProgress) -> None:
+        raise RefusedError("the controller refused TRIM: no (E 7).", code=7)
+
+    link = opened(board.device)
+    prepare(link)
+    outcome, _ = play(link, program, seconds=5, watch=refused)
+    assert (outcome.ended, outcome.fault) == ("refused", "the board refused a request (E 7)")
+    assert outcome.message == "the controller refused TRIM: no (E 7)."
+
+
 def test_an_interlock_that_opens_ends_the_run_and_forbids_the_next(board: Board, program: Program) -> None:
     link = opened(board.device)
     prepare(link)

@@ -14,14 +14,14 @@ from typing import Literal
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.strobe.clock import ClockFit, ClockQuery, fit_clock
-from psvideo.strobe.link.exchange import Link
+from psvideo.strobe.link.exchange import Link, RefusedError
 from psvideo.strobe.link.greeting import START_WITHIN_S, greet
 from psvideo.strobe.link.replies import Capabilities, Cleared, Identity, Started, Status, Stopped, WiringSet
 from psvideo.strobe.link.requests import Caps, Clear, Run, Stat, Stop, Wiring
 from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import Program
 
-Ended = Literal["done", "stopped", "fault", "lost"]
+Ended = Literal["done", "stopped", "fault", "refused", "lost"]
 ASK_EVERY_S = 0.2
 """How often the host asks for status and clock while lights run: several times within any keep-alive."""
 FAULTS: Mapping[str, str] = {
@@ -141,7 +141,8 @@ def run_program(
     except PsvideoError as fault:
         if record.began_s is None:
             raise
-        record.ended, record.fault, record.message = "lost", "the connection to the board broke", str(fault)
+        record.ended, record.fault = _broken_off(fault)
+        record.message = str(fault)
     finally:
         with contextlib.suppress(PsvideoError):
             record.cycles = max(record.cycles, link.ask(Stop(), Stopped).cycles)
@@ -205,6 +206,13 @@ def _went_dark(name: str, record: _Record) -> str:
         f"{name}: the board went dark by itself in the middle of the run ({record.fault}), after {record.cycles} whole "
         "cycles. Find the cause, then run the command again, which clears the fault."
     )
+
+
+def _broken_off(fault: PsvideoError) -> tuple[Ended, str]:
+    """Return how a run ended that the host broke off, and why, for its log."""
+    if isinstance(fault, RefusedError):
+        return "refused", f"the board refused a request (E {int(fault.code)})"
+    return "lost", "the connection to the board broke"
 
 
 def _outcome(record: _Record, program: Program) -> Outcome:

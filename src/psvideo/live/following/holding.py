@@ -22,9 +22,9 @@ def trim_by(ppm: int) -> Trim:
 class Holding:
     """Holds the dark row of a chain's strobe at a target. ``ask`` sends a trim to the board.
 
-    ``ppm`` is the trim that the board has, ``most_ppm`` the largest that it ever had, either way; ``short_rows`` by how
-    much the dark row was off its target when it was last looked at, None while nothing is followed; ``note`` says why
-    the board refused, where it did, ``ended`` that it plays no more.
+    ``ppm`` is the trim that the board has, ``most_ppm`` the largest that it may ever have had, either way;
+    ``short_rows`` by how much the dark row was off its target when it was last looked at, None while nothing is
+    followed; ``note`` says why the board refused, where it did, ``ended`` that it plays no more.
     """
 
     chain: Chain
@@ -36,6 +36,7 @@ class Holding:
     note: str = ""
     ended: bool = False
     _asked_s: float = field(default=-EVERY_S)
+    _unsure: bool = False
 
     def beat(self, host_s: float) -> None:
         """Look at the dark row, and trim the strobe where it is due; to be called several times in ``EVERY_S``."""
@@ -46,7 +47,9 @@ class Holding:
             wanted = self._wanted_ppm(host_s)
             step_s = self.chain.plan.cycle_s / len(self.chain.plan.cycle_slots)
             counts_s = self.chain.camera_s(host_s) + STEPS_UNTIL * step_s
-        if wanted == self.ppm or not self._trimmed(wanted):  # frames do not wait for the board's answer
+        if (wanted == self.ppm and not self._unsure) or not self._trimmed(
+            wanted
+        ):  # frames do not wait for the board's answer
             return
         with self.chain.at_rest():
             if self.chain.follower is not None:
@@ -66,14 +69,16 @@ class Holding:
         return next_trim_ppm(self.ppm, seen, self.target, camera)
 
     def _trimmed(self, ppm: int) -> bool:
+        """Ask for a trim and return whether the board has it now; where it refuses, the one before counts on."""
         try:
             self.ask(trim_by(ppm))
         except RefusedError as refused:
-            if refused.code == Error.STATE:
-                return False  # the one before does not count yet: the next beat asks again
-            if refused.code != Error.LIMIT:
-                raise
-            self.note = str(refused)
+            self._unsure = refused.code == Error.STATE
+            if self._unsure:  # one does not count yet: the one before, or this one, whose answer was lost
+                self.most_ppm = max(self.most_ppm, abs(ppm))
+            else:
+                self.note = str(refused)
             return False
+        self._unsure = False
         self.ppm, self.most_ppm = ppm, max(self.most_ppm, abs(ppm))
         return True

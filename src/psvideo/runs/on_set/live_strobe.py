@@ -14,6 +14,7 @@ from psvideo.live.following.holding import Holding
 from psvideo.runs.steps.caller import Caller
 from psvideo.runs.strobe.port import opened_port
 from psvideo.runs.strobe.run import warn_of_flashing
+from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.exchange import Link
 from psvideo.strobe.link.ports import EMULATED
 from psvideo.strobe.link.replies import Trimmed
@@ -51,6 +52,7 @@ def held_strobe(
     with opened_port(port) as opened:
         link = Link(opened)
         ready = prepare(link)
+        _check_trims(ready.identity.board, opened.name)
         program = make_program(plan, ready.caps, source=str(plan_path))
         holding = Holding(chain=chain, target=target, ask=lambda trim: link.ask(trim, Trimmed))
         over = threading.Event()
@@ -65,6 +67,16 @@ def held_strobe(
         finally:
             over.set()
             player.join()
+
+
+def _check_trims(board: str, port: str) -> None:
+    """Raise UsageError where a board takes no trims, before it flashes."""
+    if board in BOARDS and not BOARDS[board].trims:
+        able = ", ".join(name for name, one in BOARDS.items() if one.trims)
+        raise UsageError(
+            f"{port}: `lock` trims the strobe's period while it runs, and this board, an {board}, takes no trims: it "
+            f"plays by itself. Use one that does ({able}), or leave `lock` out and play the plan by psvideo strobe run."
+        )
 
 
 def _play(

@@ -19,7 +19,10 @@ KEEP_AFTER_RESET_MS = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class Board:
-    """One kind of board: its tick, what it holds, and for each wiring how many lines and how many powers a flash."""
+    """One kind of board: its tick, what it holds, and for each wiring how many lines and how many powers a flash.
+
+    ``trims``: its steps can be made longer or shorter while it runs.
+    """
 
     name: str
     tick_ps: int
@@ -30,6 +33,7 @@ class Board:
     min_on_us: int
     min_off_us: int
     tolerance_ppm: int
+    trims: bool
 
     @property
     def first_wiring(self) -> WiringName:
@@ -58,6 +62,7 @@ BOARDS: Mapping[str, Board] = {
             min_on_us=20,
             min_off_us=20,
             tolerance_ppm=5000,
+            trims=True,
         ),
         Board(
             name="atmega2560",
@@ -69,6 +74,7 @@ BOARDS: Mapping[str, Board] = {
             min_on_us=20,
             min_off_us=20,
             tolerance_ppm=5000,
+            trims=True,
         ),
         Board(
             name="rp2040",
@@ -80,6 +86,7 @@ BOARDS: Mapping[str, Board] = {
             min_on_us=1,
             min_off_us=1,
             tolerance_ppm=100,
+            trims=False,
         ),
     )
 }
