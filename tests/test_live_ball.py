@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -51,11 +51,7 @@ BALL = Ball(centre=(0.02, 0.01, -0.5))
 def test_a_click_finds_the_lights_on_a_ball_and_keeps_the_cameras_lens() -> None:
     found: list[Rig] = []
 
-    def kept(rig: Rig) -> str:
-        found.append(rig)
-        return "kept"
-
-    ball = BallLights(rig=lens_rig(), found=kept)
+    ball = BallLights(rig=lens_rig(), found=kept_in(found))
     ball.look(newest([BALL]))
     assert not found, "nobody asked"
     ball.calibrate(newest([BALL]))
@@ -68,14 +64,73 @@ def test_a_click_finds_the_lights_on_a_ball_and_keeps_the_cameras_lens() -> None
     assert len([words for words in ball.words if "degrees" in words]) >= 3
 
 
+def kept_in(found: list[Rig]) -> Callable[[Rig], str]:
+    def keep(rig: Rig) -> str:
+        found.append(rig)
+        return "kept"
+
+    return keep
+
+
+def strong_rig() -> Rig:
+    """The lens and lights that were measured: of these, one is coloured and was measured for another time."""
+    named = lens_rig()
+    key, left, top = named.lights
+    key = replace(key, intensity=(1.0, 0.9, 0.8), reference_duration_s=0.002)
+    left, top = replace(left, intensity=(0.5,)), replace(top, intensity=(0.25,), colour=(1.0, 0.1, 0.05))
+    return replace(named, lights=(top, key, left))
+
+
+def test_a_ball_shows_directions_and_what_a_named_rig_knows_beside_them_is_kept() -> None:
+    found: list[Rig] = []
+    ball = BallLights(rig=strong_rig(), found=kept_in(found))
+    for _ in range(2):
+        ball.calibrate(newest([BALL]))
+        known = {light.name: light for light in strong_rig().lights}
+        assert len(found[-1].lights) == len(known)
+        for light in found[-1].lights:
+            assert light.direction != known[light.name].direction
+            measured = replace(light, direction=known[light.name].direction, error_deg=None)
+            assert measured == known[light.name]
+        assert not any("equally strong" in words for words in ball.words)
+
+
+@pytest.mark.parametrize("named", [None, "near"])
+def test_strengths_that_nobody_measured_are_said_to_be_taken_as_equal(named: str | None) -> None:
+    found: list[Rig] = []
+    rig = None if named is None else strong_rig()
+    if rig is not None:
+        near = replace(rig.lights[0], direction=None, position_m=(0.5, 0.2, 0.1))
+        rig = replace(rig, lights=(near, *rig.lights[1:]))
+    ball = BallLights(rig=rig, found=kept_in(found))
+    for _ in range(2):
+        ball.calibrate(newest([BALL]))
+        assert {light.intensity for light in found[-1].lights} == {(1.0,)}
+        assert "equally strong" in ball.words[1]
+        assert ("no strength of top" if named else "no `rig` is named") in ball.words[1]
+
+
+def test_whatever_goes_wrong_with_a_ball_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> object:
+        raise ZeroDivisionError("by nothing")
+
+    ball = BallLights(rig=None, found=lambda rig: "kept")
+    ball.ask()
+    monkeypatch.setattr("psvideo.live.ball_lights.lights_on_ball", broken)
+    ball.calibrate(newest([BALL]))
+    assert len(ball.words) == 1
+    assert "nothing was changed: ZeroDivisionError('by nothing')" in ball.words[0]
+
+
 def test_a_picture_without_a_ball_is_a_sentence_and_changes_nothing() -> None:
     def kept(rig: Rig) -> str:
         raise AssertionError(rig)
 
     ball = BallLights(rig=None, found=kept)
     ball.calibrate(newest([]))
-    assert len(ball.words) == 1
+    assert len(ball.words) == 2
     assert "no sphere" in ball.words[0]
+    assert "options of psvideo calibrate mirror-sphere" in ball.words[1], "live has no `circle`"
 
 
 def test_without_a_lens_directions_are_found_and_the_doubt_is_said() -> None:
