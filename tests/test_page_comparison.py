@@ -99,6 +99,29 @@ def test_before_and_after_are_the_plates_that_the_command_writes(shoot: Path, of
     assert max(apart) > 0.01, "Algorithm 1 is led astray by the scene's dark rows"
 
 
+@pytest.mark.parametrize("dark_every", [1, 5])
+def test_beside_a_round_stand_the_plates_of_that_round(tmp_path: Path, dark_every: int) -> None:
+    """Also of the last light, whose flash is nearer to the next round's first; and where few rounds have dark slots."""
+    scene = (SCENES / "sphere.toml").read_text(encoding="utf-8").replace("frames = 12", "frames = 90")
+    scene = scene.replace("width_px = 160\nheight_px = 120", "width_px = 40\nheight_px = 30")
+    scene = scene.replace("flash_s = 0.001", f"flash_s = 0.001\ndark_every = {dark_every}")
+    (tmp_path / "sphere.toml").write_text(scene)
+    clip = tmp_path / "clip"
+    assert main(["synth", str(tmp_path / "sphere.toml"), "-o", str(clip), "-q"]) == 0
+    assert main(["split", str(clip), "-o", str(tmp_path / "plates"), "-q"]) == 0
+    rig = str(clip / "rig.toml")
+    assert main(["normals", str(clip), "--rig", rig, "-o", str(tmp_path / "out"), "-q"]) == 0
+    for name in ("plates", "out"):
+        show = show_of(tmp_path / name)
+        lights = [sequence for sequence in show.sequences if sequence.id.startswith("weights-")]
+        assert len(lights) == 3
+        for sequence in lights:
+            numbers = sequence.numbers[1:-1:4]
+            assert len(numbers) > 3
+            rounds = [sequence.read(number, Look(width_px=40)).facts["round"] for number in numbers]
+            assert rounds == list(numbers)
+
+
 def test_algorithm_1_makes_the_plates_that_the_command_writes(shoot: Path) -> None:
     show = show_of(shoot / "plates")
     compared = 0

@@ -162,6 +162,43 @@ def test_a_width_that_is_none_is_refused(server: PageServer, width: str) -> None
     assert ask(server, f"/picture/normals/1001?width={quote(width)}")[0] == 400
 
 
+NANOSECONDS = 1732640000123456789
+
+
+@pytest.mark.parametrize("numbers", [(1732640000, 1732640001), (1732640000123, 1732640000133), (NANOSECONDS,)])
+def test_pictures_are_asked_for_by_numbers_as_long_as_times(numbers: tuple[int, ...], tmp_path: Path) -> None:
+    normals, _ = small.ball()
+    for number in numbers:
+        small.write(tmp_path / "normals" / f"take_normals.{number}.exr", small.rgb(normals), number, time_s=0.1)
+    with page_server(show_of(tmp_path), port=0) as one:
+        thread = threading.Thread(target=one.serve_forever)
+        thread.start()
+        try:
+            for number in numbers:
+                written = f"{float(number):.0f}"  # as a browser does, whose numbers are floats
+                assert ask(one, f"/picture/normals/{written}")[0] == 200
+        finally:
+            one.shutdown()
+            thread.join()
+
+
+def test_pictures_have_the_times_that_their_files_say(tmp_path: Path) -> None:
+    """Rounds with a dark slot are longer than those without, and the strobe's clock is not the camera's."""
+    normals, _ = small.ball()
+    times_s = {1001: 0.04, 1002: 0.07, 1003: 0.1, 1004: 0.15, 1007: 0.18}
+    for number, time_s in times_s.items():
+        for name in ("normals", "albedo"):
+            small.write(tmp_path / name / f"take_{name}.{number}.exr", small.rgb(normals), number, time_s=time_s)
+    (tmp_path / "albedo" / "take_albedo.1007.exr").unlink()
+    show = show_of(tmp_path)
+    assert show.sequences[0].times_s == pytest.approx(list(times_s.values()))
+    assert show.sequences[1].times_s == pytest.approx(list(times_s.values())[:-1])
+    damaged = tmp_path / "normals" / "take_normals.1004.exr"
+    damaged.write_bytes(damaged.read_bytes()[:40])
+    about_s = show_of(tmp_path).sequences[0].times_s[3]
+    assert about_s == pytest.approx(0.1 + 1 / float(small.RATE)), "a round after the nearest that says its time"
+
+
 def test_a_corrupt_picture_is_missing_and_says_why_while_others_are_there(server: PageServer) -> None:
     facts, pixels = unpacked(ask(server, "/picture/normals/1003")[1])
     assert "take_normals.1003.exr" in str(facts["missing"])
@@ -190,6 +227,14 @@ def test_of_a_folder_of_several_takes_one_is_to_be_named(tmp_path: Path) -> None
         small.results(tmp_path / "results" / name)
     with pytest.raises(UsageError, match=r"holds results of 2 takes\. Name one, such as .*take1"):
         show_of(tmp_path / "results")
+
+
+def test_single_flashes_without_plates_are_named(tmp_path: Path) -> None:
+    small.results(tmp_path / "out")
+    (tmp_path / "out" / "timing.json").rename(tmp_path / "timing.json")
+    (tmp_path / "out" / "normals").rename(tmp_path / "flashes")
+    with pytest.raises(PsvideoError, match="single flashes and no plates of a light"):
+        show_of(tmp_path)
 
 
 def test_a_folder_that_holds_nothing_to_show_is_named(tmp_path: Path) -> None:

@@ -32,13 +32,21 @@ CAMERA = np.array([[0.0, 0.0, 1.0, 3.0], [0.6, 0.8, 0.0, -2.0], [-0.8, 0.6, 0.0,
 """A camera-to-world matrix: where the camera's axes point in the world (columns), and where it stands."""
 
 
-def write(path: Path, channels: dict[str, np.ndarray], number: int, *, y: str = "up", world: bool = False) -> None:
-    """Write one EXR as formats.md says results are."""
+def write(
+    path: Path,
+    channels: dict[str, np.ndarray],
+    number: int,
+    *,
+    y: str = "up",
+    world: bool = False,
+    time_s: float | None = None,
+) -> None:
+    """Write one EXR as formats.md says results are; ``time_s`` left out: rounds are as long as each other."""
     header = {
         "type": OpenEXR.scanlineimage,
         "compression": OpenEXR.ZIP_COMPRESSION,
         "framesPerSecond": RATE,
-        "psvideo:time_s": 0.1 + (number - FIRST) / float(RATE),
+        "psvideo:time_s": 0.1 + (number - FIRST) / float(RATE) if time_s is None else time_s,
         "psvideo:space": "world" if world else "camera",
         "psvideo:y": y,
     }

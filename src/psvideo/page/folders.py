@@ -14,10 +14,13 @@ from psvideo.formats.timing_json import read_timing, timing_record
 from psvideo.inspect.about_output import is_plates, is_results, solved_takes_in
 from psvideo.model.quantities import QUANTITIES, Quantity
 from psvideo.model.units import counted
+from psvideo.page.file_times import file_times_s
 from psvideo.page.footage import show_of_clip, with_clip
 from psvideo.page.picture import Look, PagePicture, shown
 from psvideo.page.show import Show, ShownSequence
 
+FLASHES = "flashes"
+"""Where split writes every flash by itself, beside the plates."""
 PLATE, AMBIENT = QUANTITIES["plate"], QUANTITIES["ambient"]
 
 
@@ -73,7 +76,9 @@ def _results(path: Path) -> Show:
         for row in QUANTITIES.values()
         if row.written != "plates" and row.shown != "never" and _files(path / row.name)
     ]
-    sequences = [_sequence(path / row.name, row) for row in known]
+    first = _files(path / known[0].name)
+    times_s = file_times_s(first, _rate(_first_header(first)))
+    sequences = [_sequence(path / row.name, row, like=(tuple(sorted(first)), times_s)) for row in known]
     width_px, height_px, fps = _look(path / known[0].name)
     report = _report(path / "report.json")
     return Show(
@@ -93,11 +98,16 @@ def _results(path: Path) -> Show:
 
 def _plates(path: Path) -> Show:
     folders = sorted(entry for entry in path.iterdir() if entry.is_dir() and _files(entry))
+    folders = [folder for folder in folders if folder.name != FLASHES]
     folders.sort(key=lambda folder: folder.name == AMBIENT.name)
+    if not folders:
+        raise PsvideoError(
+            f"{path}: holds single flashes and no plates of a light; expected a folder for each light, as psvideo "
+            f"split writes them. Run it again, or bring them back beside {FLASHES}/."
+        )
     sequences = [
         replace(_sequence(folder, PLATE), label=folder.name, group="Plates", id=f"plate-{place}", family="camera")
         for place, folder in enumerate(folders)
-        if folder.name != "flashes"
     ]
     width_px, height_px, fps = _look(folders[0])
     return Show(
@@ -111,12 +121,15 @@ def _plates(path: Path) -> Show:
     )
 
 
-def _sequence(folder: Path, quantity: Quantity) -> ShownSequence:
+Instants = tuple[tuple[int, ...], tuple[float, ...]]
+"""Numbers of pictures, and their times in seconds."""
+
+
+def _sequence(folder: Path, quantity: Quantity, *, like: Instants = ((), ())) -> ShownSequence:
+    """Return a folder's pictures; where they have the numbers of ``like``, also its times, as of one instant."""
     files = _files(folder)
     head = _first_header(files)
-    rate = float(Fraction(str(head.get("framesPerSecond", "24"))))
     numbers = tuple(sorted(files))
-    first_s = float(head.get("psvideo:time_s") or 0.0)
     return ShownSequence(
         id=folder.name,
         label=quantity.label,
@@ -124,7 +137,7 @@ def _sequence(folder: Path, quantity: Quantity) -> ShownSequence:
         group="Results",
         timeline="rounds",
         numbers=numbers,
-        times_s=tuple(first_s + (number - numbers[0]) / rate for number in numbers),
+        times_s=like[1] if numbers == like[0] else file_times_s(files, _rate(head)),
         read=partial(_read, files, quantity),
         unit=quantity.unit,
         from_zero=quantity.from_zero,
@@ -162,8 +175,11 @@ def _first_header(files: Mapping[int, Path]) -> Mapping[str, str | int | float |
 
 def _look(folder: Path) -> tuple[int, int, float]:
     head = _first_header(_files(folder))
-    rate = float(Fraction(str(head.get("framesPerSecond", "24"))))
-    return int(head["width_px"] or 0), int(head["height_px"] or 0), rate
+    return int(head["width_px"] or 0), int(head["height_px"] or 0), _rate(head)
+
+
+def _rate(head: Mapping[str, str | int | float | None]) -> float:
+    return float(Fraction(str(head.get("framesPerSecond", "24"))))
 
 
 def _timing_of(path: Path) -> partial[Mapping[str, object]] | None:

@@ -79,6 +79,7 @@ def page_picture(image: np.ndarray, look: Look, **facts: object) -> PagePicture:
 
 def _compared(clip: Clip, plates: ComparedPlates, beside: ShownSequence) -> chain[ShownSequence]:
     """Return one sequence per method and light, on the timeline of another sequence."""
+    times_s = dict(zip(beside.numbers, beside.times_s, strict=True))
     return chain.from_iterable(
         [
             replace(
@@ -87,7 +88,7 @@ def _compared(clip: Clip, plates: ComparedPlates, beside: ShownSequence) -> chai
                 label=f"{light}, Algorithm 1" if method == "hudon2015" else f"{light}, weights",
                 kind="light",
                 group=group,
-                read=partial(_plate, plates, method, light, dict(zip(beside.numbers, beside.times_s, strict=True))),
+                read=partial(_plate, plates, method, light, _flash_of(beside, light), times_s),
                 slow=True,
                 family=FAMILY,
             )
@@ -97,8 +98,24 @@ def _compared(clip: Clip, plates: ComparedPlates, beside: ShownSequence) -> chai
     )
 
 
+def _flash_of(beside: ShownSequence, light: str) -> str | None:
+    """Return the light at whose flashes the pictures of a sequence are; None: in the middle of rounds, as results are.
+
+    Beside a frame stands of every light the plate that is nearest to it; beside a plate, what is of the same round.
+    """
+    if beside.timeline == "frames":
+        return light
+    return beside.label if beside.group == "Plates" else None
+
+
 def _plate(
-    plates: ComparedPlates, method: SplitMethod, light: str, times_s: dict[int, float], number: int, look: Look
+    plates: ComparedPlates,
+    method: SplitMethod,
+    light: str,
+    of: str | None,
+    times_s: dict[int, float],
+    number: int,
+    look: Look,
 ) -> PagePicture:
-    found = plates.plate(method, light, times_s[number])
+    found = plates.plate(method, light, times_s[number], of=of)
     return page_picture(found.image, look, time_s=found.time_s, round=found.number)

@@ -14,7 +14,7 @@ from urllib.parse import parse_qs, urlsplit
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.page.assembled import assets
 from psvideo.page.picture import Look
-from psvideo.page.show import Show, index_of
+from psvideo.page.show import Show, ShownSequence, index_of
 from psvideo.page.store import BlockStore
 
 ADDRESS = "127.0.0.1"
@@ -30,7 +30,8 @@ REPORT_POLICY = (
     "frame-ancestors 'none'"
 )
 """A report is one file: its style and pictures are in it, and it runs nothing."""
-PICTURE = re.compile(r"/picture/([A-Za-z0-9_.:+-]+)/(\d{1,9})")
+PICTURE = re.compile(r"/picture/([A-Za-z0-9_.:+-]+)/(\d{1,21})")
+"""Numbers may be times in nanoseconds; a browser writes whole ones without an exponent up to 21 digits."""
 MOST_PORT = 65535
 """Ports are numbers of 16 bits (RFC 9293)."""
 STALE_S = 20.0
@@ -113,7 +114,7 @@ class Handler(BaseHTTPRequestHandler):
         elif asked.path == "/timing.json" and self.server.show.timing is not None:
             self._answer_json(_or_fault(self.server.show))
         elif picture := PICTURE.fullmatch(asked.path):
-            self._picture(picture[1], int(picture[2]), asked.query)
+            self._picture(picture[1], picture[2], asked.query)
         else:
             self._refuse(HTTPStatus.NOT_FOUND, "There is nothing of that name here.")
 
@@ -125,12 +126,13 @@ class Handler(BaseHTTPRequestHandler):
         except OSError:
             self._refuse(HTTPStatus.NOT_FOUND, "The report is not there any more.")
 
-    def _picture(self, name: str, number: int, query: str) -> None:
+    def _picture(self, name: str, digits: str, query: str) -> None:
         show = self.server.show
         sequence = show.sequence(name)
         asked = parse_qs(query)
         width = asked.get("width", [str(show.width_px)])[0]
-        if sequence is None or number not in sequence.numbers:
+        number = None if sequence is None else _number_asked_for(sequence, digits)
+        if sequence is None or number is None:
             self._refuse(HTTPStatus.NOT_FOUND, "There is no such picture.")
         elif not width.isascii() or not width.isdigit() or len(width) > 5 or int(width) not in WIDTHS_PX:
             self._refuse(HTTPStatus.BAD_REQUEST, f"width is {WIDTHS_PX.start} to {WIDTHS_PX.stop - 1} pixels.")
@@ -164,6 +166,11 @@ class Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002  # the base class's name
         """Say nothing: the command prints what people need."""
+
+
+def _number_asked_for(sequence: ShownSequence, digits: str) -> int | None:
+    """Return the number that a browser means, whose numbers are floats; None where there is none."""
+    return next((number for number in sequence.numbers if float(number) == float(digits)), None)
 
 
 def _or_fault(show: Show) -> object:

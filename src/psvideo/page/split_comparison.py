@@ -67,11 +67,12 @@ class ComparedPlates:
         ]
         return timing_record(timing) | {"first_number": numbers[0], "dropped_frames": dropped}
 
-    def plate(self, method: SplitMethod, light: str, time_s: float) -> ComparedPlate:
-        """Return a light's plate of the round that is nearest to a time. Raises PsvideoError where there is none."""
+    def plate(self, method: SplitMethod, light: str, time_s: float, *, of: str | None = None) -> ComparedPlate:
+        """Return a light's plate of the round at a time: the one whose flashes of the light ``of`` are nearest to it;
+        None: the one whose middle is. Raises PsvideoError where there is none."""
         with self._lock:
             take, timing = self._timed()
-            number = _nearest_round(timing, light, time_s)
+            number = _nearest_round(timing, of, time_s)
             if method not in self._rounds or self._rounds[method][0] != number:
                 self._rounds[method] = (number, _plates(take, timing, method, number))
             plates = self._rounds[method][1]
@@ -90,18 +91,21 @@ class ComparedPlates:
         return self._take, self._timing
 
 
-def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
-    """Return the number of the round whose complete flashes of a light are nearest to a time."""
+def _nearest_round(timing: Timing, light: str | None, time_s: float) -> int:
+    """Return the number of the round whose complete flashes of a light, or whose middle (None), are nearest to a
+    time."""
     from psvideo.plates.sequence import round_numbers
 
-    away_s = {
-        abs(flash.start_s - time_s): number
-        for number, flash in zip(round_numbers(timing.flashes), timing.flashes, strict=True)
-        if flash.complete and light in flash.lit
-    }
-    if not away_s:
-        raise PsvideoError(f"The clip holds no complete flash of {light}, so there is nothing to compare.")
-    return away_s[min(away_s)]
+    by_round: dict[int, list[float]] = {}
+    for number, flash in zip(round_numbers(timing.flashes), timing.flashes, strict=True):
+        if flash.complete and (flash.lit if light is None else light in flash.lit):
+            by_round.setdefault(number, []).append(flash.start_s + 0.5 * flash.duration_s)
+    if not by_round:
+        of = "" if light is None else f" of {light}"
+        raise PsvideoError(f"The clip holds no complete flash{of}, so there is nothing to compare.")
+    if light is None:
+        by_round = {number: [sum(middles_s) / len(middles_s)] for number, middles_s in by_round.items()}
+    return min(by_round, key=lambda number: min(abs(middle_s - time_s) for middle_s in by_round[number]))
 
 
 def _plates(take: "Take", timing: Timing, method: SplitMethod, number: int) -> Mapping[str, ComparedPlate]:

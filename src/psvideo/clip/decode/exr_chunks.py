@@ -1,4 +1,5 @@
-"""Whether an OpenEXR file of scan lines is whole, judged by its table of chunks, without decoding a pixel.
+"""Whether an OpenEXR file of scan lines is whole, judged by its table of chunks, without decoding a pixel; and one
+number of its header, for thousands of files at once.
 
 The library finds a truncated file too, but writes about it to the terminal by itself. The layout is that of the
 "OpenEXR File Layout" document: magic number, version, attributes up to an empty name, then one offset per chunk.
@@ -12,6 +13,7 @@ from typing import BinaryIO
 MAGIC = 20000630
 TILED, DEEP, SEVERAL_PARTS = 0x200, 0x800, 0x1000
 # By compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+NUMBERS = {8: "<d", 4: "<f"}
 ROWS_PER_CHUNK = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
 
 
@@ -41,6 +43,19 @@ def is_cut_short(path: Path) -> bool:
         except (KeyError, IndexError):
             return False
     return bool(min(offsets) == 0 or max(offsets) + 8 + length > size)
+
+
+def number_in_header(path: Path, name: str) -> float | None:
+    """Return the number that a file's (first) header holds under a name; None where it holds none, or cannot be
+    read."""
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            (magic, _) = struct.unpack("<II", file.read(8))
+            value = next((value for key, value in _attributes(file, size) if key == name), b"")
+        return float(struct.unpack(NUMBERS[len(value)], value)[0]) if magic == MAGIC and value else None
+    except (OSError, struct.error, KeyError, UnicodeDecodeError):
+        return None
 
 
 def _attributes(file: BinaryIO, size: int) -> Iterator[tuple[str, bytes]]:
