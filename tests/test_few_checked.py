@@ -112,6 +112,7 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
         counts=np.ones_like(measured),
         towards=np.repeat(FOUR[:, None], len(truth), axis=1),
         half=np.repeat(half[:, None], len(truth), axis=1),
+        to_camera=np.broadcast_to(UP, truth.shape),
         normals=g / np.linalg.norm(g, axis=1, keepdims=True),
     )
     turned = few_checked.model_turns_deg(points, g)
@@ -123,6 +124,7 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
         counts=points.counts,
         towards=points.towards,
         half=points.half,
+        to_camera=points.to_camera,
         normals=truth,
     )
     assert few_checked.model_turns_deg(flat, 0.5 * truth).max() < 1

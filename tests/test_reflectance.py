@@ -1,5 +1,6 @@
 """What a whole subject reflects beyond n . l is found from all of it, and used where a pixel is explained better."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numba
@@ -16,8 +17,11 @@ from psvideo.model.surface import Reflectance, Subject, Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
+from psvideo.solve.depth import View
+from psvideo.solve.images import solve_images
 from psvideo.solve.instants import subject_of
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_kernel import fill_roughness_in_the_fit
@@ -30,6 +34,9 @@ SIZE = 64
 
 
 WAYS = np.concatenate([ring(8, 45), ring(4, 20)])
+UP = np.array([0.0, 0.0, 1.0])
+BESIDE_THE_AXIS = View(focal_px=(1.5 * SIZE, 1.5 * SIZE), principal_px=(1.0 * SIZE, 1.2 * SIZE))
+"""What it shows lies 16 to 35 degrees beside the camera's axis."""
 
 
 def waves() -> Array:
@@ -40,10 +47,19 @@ def waves() -> Array:
     return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True))
 
 
-def shot(normals: Array, sent: Array, *, gloss: Array | float) -> list[NDArray[np.float32]]:
+def through(lens: View) -> Array:
+    """The way to the camera from what every pixel shows."""
+    x, y = lens.rays(SIZE, SIZE)
+    ways = np.stack([*np.broadcast_arrays(-x, -y), np.ones((SIZE, SIZE))], axis=-1)
+    return np.asarray(ways / np.linalg.norm(ways, axis=-1, keepdims=True))
+
+
+def shot(
+    normals: Array, sent: Array, *, gloss: Array | float, to_camera: Array | None = None
+) -> list[NDArray[np.float32]]:
     """Plates of a brown surface with highlights as wide as varnish makes them; sent: (light, row, col, 3)."""
     rng, size = np.random.default_rng(1), np.linalg.norm(sent, axis=-1, keepdims=True)
-    half = sent / size + np.array([0.0, 0.0, 1.0])
+    half = sent / size + (UP if to_camera is None else to_camera)
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
     cosine = np.maximum((sent * normals).sum(axis=-1), 0)
     shine = gloss * size[..., 0] * np.maximum((half * normals).sum(axis=-1), 0) ** 25 * (cosine > 0)
@@ -103,17 +119,20 @@ def test_a_matte_subject_is_solved_as_before_to_the_byte(monkeypatch: pytest.Mon
     assert found.albedo.tobytes() == before.albedo.tobytes()
 
 
-def clay(normals: Array, ways: Array, *, roughness: Array | float) -> list[NDArray[np.float32]]:
+def clay(
+    normals: Array, ways: Array, *, roughness: Array | float, to_camera: Array | None = None
+) -> list[NDArray[np.float32]]:
     """Plates of brown clay by the angles of Oren and Nayar (1994), without the light from facet to facet."""
-    rng, up = np.random.default_rng(2), np.array([0.0, 0.0, 1.0])
+    rng, up = np.random.default_rng(2), np.broadcast_to(UP, normals.shape) if to_camera is None else to_camera
     square = np.asarray(roughness) ** 2
     flat, back = 1 - 0.5 * square / (square + 0.33), 0.45 * square / (square + 0.09)
-    seen_at = np.arccos(np.clip(normals[..., 2], -1, 1))
+    facing = (normals * up).sum(axis=-1)
+    seen_at = np.arccos(np.clip(facing, -1, 1))
     plates = []
     for way in ways:
         cosine = normals @ way
         lit_at = np.arccos(np.clip(cosine, -1, 1))
-        along, over = (each - normals * (normals @ each)[..., None] for each in (way, up))
+        along, over = way - normals * cosine[..., None], up - normals * facing[..., None]
         sizes = np.linalg.norm(along, axis=-1) * np.linalg.norm(over, axis=-1)
         between = (along * over).sum(axis=-1) / np.maximum(sizes, 1e-12)
         more = np.maximum(between, 0) * np.sin(np.maximum(lit_at, seen_at)) * np.tan(np.minimum(lit_at, seen_at))
@@ -147,6 +166,42 @@ def test_what_is_matte_beside_clay_stays_matte(monkeypatch: pytest.MonkeyPatch) 
     before = off_deg(Solving().solve(plates, under(WAYS)).normals, normals)
     assert off[:, rough].mean() < 0.8 * before[:, rough].mean()
     assert off[:, ~rough].mean() <= 1.05 * before[:, ~rough].mean()
+
+
+@pytest.mark.parametrize("material", ["gloss", "clay"])
+def test_beside_the_lens_axis_gloss_and_clay_turn_no_normal(material: str) -> None:
+    """They depend on the way to the camera, which is another in every pixel once the rig gives the lens."""
+    normals, to_camera = waves(), through(BESIDE_THE_AXIS)
+    if material == "clay":
+        plates = clay(normals, WAYS, roughness=0.6, to_camera=to_camera)
+    else:
+        sent = np.broadcast_to(WAYS[:, None, None], (len(WAYS), SIZE, SIZE, 3))
+        plates = shot(normals, sent, gloss=0.3, to_camera=to_camera)
+    lamps = [Light(name=str(k), direction=(float(x), float(y), float(z))) for k, (x, y, z) in enumerate(WAYS)]
+    far_away = Rig(lights=tuple(lamps))
+    lens = replace(far_away, focal_px=BESIDE_THE_AXIS.focal_px, principal_px=BESIDE_THE_AXIS.principal_px)
+    before, found = (solve_images(plates, rig, saturation=np.inf) for rig in (far_away, lens))
+    off, off_before = (off_deg(one.normals, normals).mean() for one in (found, before))
+    assert off < 0.5
+    assert off < 0.25 * off_before
+    assert found.valid.mean() > 0.99
+
+
+def test_through_a_lens_a_pixel_is_solved_alike_whatever_is_beside_it_and_by_any_number_of_threads() -> None:
+    normals, to_camera = waves(), through(BESIDE_THE_AXIS)
+    sent = np.broadcast_to(WAYS[:, None, None], (len(WAYS), SIZE, SIZE, 3))
+    plates = shot(normals, sent, gloss=0.3, to_camera=to_camera)
+    lit = replace(under(WAYS), view=BESIDE_THE_AXIS)
+    noise = PlateNoise(read=1e-6, photon=0.0)
+    whole = huber1981.solve(plates, lit, plate_noise=noise, threads=1)
+    assert whole.misfit is not None
+    assert whole.misfit.reflectance is not None
+    again = huber1981.solve(plates, lit, plate_noise=noise, threads=4)
+    few = np.zeros((SIZE, SIZE), np.bool_)
+    few[::3, ::5] = True
+    apart = huber1981.solve(plates, lit, plate_noise=noise, mask=few, misfit=whole.misfit)
+    np.testing.assert_array_equal(again.normals, whole.normals)
+    np.testing.assert_allclose(apart.normals[few], whole.normals[few], atol=2e-5)
 
 
 def test_what_is_unsure_for_motion_says_nothing_of_the_subject() -> None:
@@ -260,7 +315,7 @@ def test_near_lights_show_the_same_sheen() -> None:
     points = np.stack([cols / focal * depth, -rows / focal * depth, np.full((SIZE, SIZE), -depth)], axis=-1)
     away = np.stack(where)[:, None, None] - points
     sent = 0.64 * away / np.linalg.norm(away, axis=-1, keepdims=True) ** 3
-    near = seen_in(shot(waves(), sent, gloss=0.15), lit)
+    near = seen_in(shot(waves(), sent, gloss=0.15, to_camera=through(lit.view)), lit)
     far_lit, far_sent = distant()
     far = seen_in(shot(waves(), far_sent, gloss=0.15), far_lit)
     assert far is not None

@@ -41,8 +41,14 @@ def towards(rng: np.random.Generator) -> Array:
 
 
 @pytest.fixture
-def half(towards: Array) -> Array:
-    return unit(towards + UP)
+def to_camera(rng: np.random.Generator) -> Array:
+    """To the camera from every point, as through a wide lens."""
+    return unit(rng.normal(size=(POINTS, 3)) * (0.3, 0.3, 0) + UP)
+
+
+@pytest.fixture
+def half(towards: Array, to_camera: Array) -> Array:
+    return unit(towards + to_camera)
 
 
 @pytest.fixture
@@ -59,34 +65,37 @@ def counts(rng: np.random.Generator) -> Array:
     return counts
 
 
-def parts_of(measured: Array, towards: Array, half: Array, g: Array) -> Array:
+def parts_of(measured: Array, towards: Array, half: Array, to_camera: Array, g: Array) -> Array:
     size, normals = np.linalg.norm(g, axis=1), unit(g)
     c, h = (towards * normals).sum(axis=-1), np.maximum((half * normals).sum(axis=-1), 0)
     bright = (c > 0) * np.minimum(TYPICAL / size, MOST_BRIGHT)
-    return np.concatenate([[measured / size, c * c * (c > 0), rough(normals, towards, c)[0]], bright * h**POWERS])
+    return np.concatenate(
+        [[measured / size, c * c * (c > 0), rough(normals, towards, to_camera, c)[0]], bright * h**POWERS]
+    )
 
 
-def rough(normals: Array, towards: Array, c: Array) -> Array:
-    angles = np.stack([c, np.broadcast_to(normals[:, 2], c.shape), towards[..., 2]]).reshape(3, -1)
+def rough(normals: Array, towards: Array, to_camera: Array, c: Array) -> Array:
+    facing, back = (normals * to_camera).sum(axis=-1), (towards * to_camera).sum(axis=-1)
+    angles = np.stack([c, np.broadcast_to(facing, c.shape), back]).reshape(3, -1)
     found = np.empty_like(angles)
     fill_roughness_in_the_fit(angles, found)
     return found.reshape(3, *c.shape)
 
 
-def shown(rng: np.random.Generator, towards: Array, half: Array, g: Array) -> Array:
+def shown(rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array) -> Array:
     """What is measured of such points under the model, with noise."""
-    parts = parts_of(np.zeros(towards.shape[:2]), towards, half, g)[1:]
+    parts = parts_of(np.zeros(towards.shape[:2]), towards, half, to_camera, g)[1:]
     c = (towards * unit(g)).sum(axis=-1)
     shade = np.maximum(c, 0) + np.tensordot(MODEL, parts, axes=1)
     return np.asarray(np.linalg.norm(g, axis=1) * shade + rng.normal(0, 0.003, c.shape))
 
 
 def test_parts_are_what_each_number_of_the_model_adds(
-    rng: np.random.Generator, towards: Array, half: Array, g: Array
+    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array
 ) -> None:
     measured, found = rng.random((LIGHTS, POINTS)), np.empty((6, LIGHTS, POINTS))
-    fill_parts(measured, towards, half, g, TYPICAL, found)
-    np.testing.assert_allclose(found, parts_of(measured, towards, half, g), rtol=1e-12, atol=1e-15)
+    fill_parts(measured, towards, half, to_camera, g, TYPICAL, found)
+    np.testing.assert_allclose(found, parts_of(measured, towards, half, to_camera, g), rtol=1e-12, atol=1e-15)
 
 
 def test_what_no_vector_of_a_points_own_explains_is_left(
@@ -122,18 +131,18 @@ def test_numbers_within_bounds_are_the_least_of_the_form(rng: np.random.Generato
 
 
 def test_a_step_is_that_of_gauss_and_newton_with_cauchys_weights(
-    rng: np.random.Generator, towards: Array, half: Array, g: Array, counts: Array
+    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array, counts: Array
 ) -> None:
-    measured = shown(rng, towards, half, g)
+    measured = shown(rng, towards, half, to_camera, g)
     begun = g * rng.uniform(0.9, 1.1, g.shape)
     found = np.empty_like(g)
-    solve_again(measured, counts, towards, half, begun, MODEL, TYPICAL, found)
+    solve_again(measured, counts, towards, half, to_camera, begun, MODEL, TYPICAL, found)
     for point in range(POINTS):
-        one = measured[:, point], counts[:, point], towards[:, point], half[:, point]
+        one = measured[:, point], counts[:, point], towards[:, point], half[:, point], to_camera[point]
         np.testing.assert_allclose(found[point], stepped(*one, begun[point]), rtol=1e-6, atol=1e-8)
 
 
-def stepped(measured: Array, counts: Array, towards: Array, half: Array, g: Array) -> Array:
+def stepped(measured: Array, counts: Array, towards: Array, half: Array, to_camera: Array, g: Array) -> Array:
     """Return one point's step; slopes are differences, of the light that its normal times albedo sends."""
     size = float(np.linalg.norm(g))
     bright = min(TYPICAL / size, MOST_BRIGHT)
@@ -142,7 +151,7 @@ def stepped(measured: Array, counts: Array, towards: Array, half: Array, g: Arra
         """What is matte, curved or rough counts by the albedo; highlights are those of the typical one."""
         normals = unit(of)[None]
         c, h = towards @ normals[0], np.maximum(half @ normals[0], 0)
-        added = rough(normals, towards[:, None], c[:, None])[0, :, 0]
+        added = rough(normals, towards[:, None], to_camera, c[:, None])[0, :, 0]
         matte = np.linalg.norm(of) * (c + MODEL[0] * (c > 0) * c * c + MODEL[1] * added)
         return np.asarray(matte + size * (c > 0) * bright * (MODEL[2:, None] * h ** POWERS[..., 0]).sum(axis=0))
 

@@ -18,6 +18,7 @@ from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
+from psvideo.solve.depth import View
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.robust import huber1981
@@ -281,6 +282,21 @@ def test_of_four_measurements_the_highlight_is_left_out(spoilt: int) -> None:
     plates[spoilt] = plates[spoilt] + np.float32(0.2)
     assert error_deg(solve(plates, lit), normals).max() < 1e-3
     assert error_deg(woodham1980.solve(plates, lit), normals).min() > 3
+
+
+@pytest.mark.parametrize("spoilt", range(4))
+def test_through_a_lens_the_highlight_of_four_is_the_one_that_is_mirrored_to_it(spoilt: int) -> None:
+    """Far beside the axis, opposite the light: along the axis the surface would mirror another."""
+    lit = Illumination(directions=ring(4, 40), intensities=np.ones((4, 1)))
+    to_camera = ring(4, 55)[(spoilt + 2) % 4]
+    across, up = 1e5 * to_camera[:2] / to_camera[2]
+    lens = View(focal_px=(1e5, 1e5), principal_px=(across, -up))
+    half = lit.directions[spoilt] + to_camera
+    normals = np.tile(half / np.linalg.norm(half), (4, 4, 1))
+    plates = shoot(normals, lit)
+    plates[spoilt] = plates[spoilt] + np.float32(0.08)
+    assert error_deg(solve(plates, lit), normals).min() > 3
+    assert error_deg(solve(plates, replace(lit, view=lens)), normals).max() < 1e-2
 
 
 def test_four_measurements_that_agree_are_all_used() -> None:

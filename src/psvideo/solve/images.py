@@ -20,6 +20,7 @@ from psvideo.solve.array_checks import (
     checked_mask,
     checked_saturation,
 )
+from psvideo.solve.depth import view_of
 from psvideo.solve.near_surface import near_surface_of, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
@@ -107,7 +108,7 @@ def solve_images(
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
 
     def light(ground: Ground | None = None) -> Illumination:
-        return illumination(rig.lights, channels=channels, ground=ground)
+        return illumination(rig.lights, channels=channels, ground=ground, view=view_of(rig))
 
     def solve(lit: Illumination) -> Surface:
         return solving.solve(plates, lit, mask=where)

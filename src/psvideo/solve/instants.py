@@ -23,6 +23,7 @@ from psvideo.model.surface import Subject, Surface
 from psvideo.plates.align.denoise import Average, added, averaged
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
+from psvideo.solve.depth import View, view_of
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.robust.reflectance import reflectance_of
@@ -112,6 +113,7 @@ class _RoundSolver:
     """What all rounds are solved with, and ``steady``: what is known of those before, which solving a round renews."""
 
     lights: Sequence[Light]
+    view: View
     shares: Sequence[NDArray[np.float32]] | None
     masks: Masks | None
     solving: Solving
@@ -139,7 +141,14 @@ class _RoundSolver:
         if shares is not None:
             lights = tuple(where_least_arrives(light, share) for light, share in zip(lights, shares, strict=True))
         return cls(
-            lights=lights, shares=shares, masks=masks, solving=solving, near=near, asked=asked, one_by_one=one_by_one
+            lights=lights,
+            view=view_of(rig),
+            shares=shares,
+            masks=masks,
+            solving=solving,
+            near=near,
+            asked=asked,
+            one_by_one=one_by_one,
         )
 
     def solve(self, one: Round) -> Instant:
@@ -175,7 +184,8 @@ class _RoundSolver:
         return [per_saturation(light, plate.saturation) for light, plate in zip(self.lights, one.plates, strict=True)]
 
     def _light(self, one: Round) -> Callable[..., Illumination]:
-        return partial(illumination, self._scaled(one), channels=1 if len(one.plates[0].shape) == 2 else 3)
+        channels = 1 if len(one.plates[0].shape) == 2 else 3
+        return partial(illumination, self._scaled(one), channels=channels, view=self.view)
 
     def _surface(self, one: Round, given: _Given) -> tuple[Surface, Illumination]:
         """Return a round's surface, and the light that it was solved with in the end: near lights' changes on the way

@@ -32,6 +32,10 @@ class View:
         """Whether the view is a pinhole's."""
         return self.focal_px is not None
 
+    def middle_px(self, rows: int, cols: int) -> tuple[float, float]:
+        """Return the principal point (col, row): where nobody said it, the middle of the picture."""
+        return self.principal_px or ((cols - 1) / 2, (rows - 1) / 2)
+
     def rays(self, rows: int, cols: int) -> tuple[Doubles, Doubles]:
         """Return x, shape (col,), and y, shape (row, 1), of the ray (x, y, -1) through every pixel's centre.
 
@@ -39,10 +43,17 @@ class View:
         """
         if self.focal_px is None:
             return np.zeros(cols), np.zeros((rows, 1))
-        centre = self.principal_px or ((cols - 1) / 2, (rows - 1) / 2)
+        centre = self.middle_px(rows, cols)
         x: Doubles = (np.arange(cols, dtype=np.float64) - centre[0]) / self.focal_px[0]
         y: Doubles = -(np.arange(rows, dtype=np.float64) - centre[1])[:, None] / self.focal_px[1]
         return x, y
+
+    def towards_camera(self, at: tuple[NDArray[np.intp], NDArray[np.intp]], rows: int, cols: int) -> Doubles:
+        """Return unit vectors (point, 3) to the camera from what is seen at rows and columns of a picture."""
+        x, y = self.rays(rows, cols)
+        towards = np.stack([-x[at[1]], -y[at[0], 0], np.ones(len(at[0]))], axis=-1)
+        unit: Doubles = towards / np.linalg.norm(towards, axis=-1, keepdims=True)
+        return unit
 
     def points(self, depth: NDArray[np.floating]) -> Doubles:
         """Return the points (row, col, 3) in the camera frame for depths along the axis; (0, 0, 0) where depth is 0.

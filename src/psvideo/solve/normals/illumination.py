@@ -1,7 +1,7 @@
 """The lights as the solvers see them: directions and intensities as arrays, checked to span all three directions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.near_light import NearField, is_near, middle_directions, near_field
 from psvideo.model.rig import LEAST_LIGHTS, Light, directions, intensities
+from psvideo.solve.depth.view import View
 
 MAX_CONDITION = 20.0
 """Lights within about 3 degrees of one plane; a normal's error is the noise's times this."""
@@ -20,12 +21,14 @@ MAX_CONDITION = 20.0
 class Illumination:
     """The lights. ``directions`` (light, 3) are unit vectors from the surface to the light; ``intensities`` is
     (light, channel): a plate is albedo * intensity * max(0, n . direction). With near lights both hold in the middle of
-    the surface, and ``near`` says what they are in every pixel."""
+    the surface, and ``near`` says what they are in every pixel. ``view`` is the camera's: gloss and roughness depend on
+    the way to it, too."""
 
     directions: Doubles
     intensities: Doubles
     names: tuple[str, ...] = ()
     near: NearField | None = None
+    view: View = field(default_factory=View)
 
     @cached_property
     def shares(self) -> Doubles:
@@ -59,8 +62,11 @@ class Illumination:
         return float(largest / smallest) if smallest > 1e-12 * largest else float("inf")
 
 
-def illumination(lights: Sequence[Light], *, channels: int, ground: Ground | None = None) -> Illumination:
-    """Return the lights as arrays, fit for solving pictures of 1 or 3 channels; near ones need a ``ground``.
+def illumination(
+    lights: Sequence[Light], *, channels: int, ground: Ground | None = None, view: View = View()
+) -> Illumination:
+    """Return the lights as arrays, fit for solving pictures of 1 or 3 channels as the camera's ``view`` is; near ones
+    need a ``ground``, which knows the view.
 
     Raises PsvideoError where there are fewer than three lights, where one is near without a ground or cannot stand
     where it is said to, where one has no or a negative intensity, and where they are so nearly coplanar that no normal
@@ -72,7 +78,7 @@ def illumination(lights: Sequence[Light], *, channels: int, ground: Ground | Non
             f"Normals need at least three lights, and here are {len(lights)} ({', '.join(names) or 'none'}). "
             "Flash three or more lights that do not lie in one plane with the subject."
         )
-    lit = _arrays(lights, channels, ground)
+    lit = _arrays(lights, channels, ground, view)
     for name, strengths in zip(names, lit.intensities, strict=True):
         if not (np.isfinite(strengths).all() and (strengths > 0).all()):
             raise PsvideoError(
@@ -83,13 +89,14 @@ def illumination(lights: Sequence[Light], *, channels: int, ground: Ground | Non
     return lit
 
 
-def _arrays(lights: Sequence[Light], channels: int, ground: Ground | None) -> Illumination:
+def _arrays(lights: Sequence[Light], channels: int, ground: Ground | None, view: View) -> Illumination:
     names, strengths = tuple(light.name for light in lights), intensities(lights, channels)
     if ground is None or not is_near(lights):
-        return Illumination(directions=directions(lights), intensities=strengths, names=names)
-    field = near_field(lights, ground)
-    at_middle = strengths * field.middle_gain[:, None]
-    return Illumination(directions=middle_directions(field), intensities=at_middle, names=names, near=field)
+        return Illumination(directions=directions(lights), intensities=strengths, names=names, view=view)
+    near = near_field(lights, ground)
+    at_middle = strengths * near.middle_gain[:, None]
+    view = View(focal_px=ground.focal_px, principal_px=ground.principal_px)
+    return Illumination(directions=middle_directions(near), intensities=at_middle, names=names, near=near, view=view)
 
 
 def _refuse_coplanar(lit: Illumination) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for
 from psvideo.model.arrays import Bytes, Doubles, Floats, Mask
 from psvideo.model.rows.clipping import ROUNDING
+from psvideo.solve.depth.view import View
 from psvideo.solve.normals.illumination import Illumination
 
 Samples = NDArray[Any]  # of float32 or uint16
@@ -49,7 +50,8 @@ EVERYTHING = Usable(saturation=np.inf, dark_level=_NO_LIMIT, shadow_ratio=_NO_LI
 
 
 class Near(NamedTuple):
-    """What gives every pixel a matrix of its own: where the lights stand, and where the surface is."""
+    """What gives every pixel a matrix of its own: where the lights stand, and where the surface is; and the way to the
+    camera, where that is known."""
 
     positions: Floats  # (light, 3) in metres; of a distant light its direction
     is_near: Bytes  # (light,)
@@ -57,7 +59,7 @@ class Near(NamedTuple):
     anisotropy: Floats  # (light,): the light falls off with this power of the cosine from its axis
     strengths: Floats  # (light,): intensity at 1 m, or of a distant light, in the matrix's unit; 0 for a copy
     depth: Floats  # (row, col) in metres along the camera's axis, or empty
-    pinhole: Floats  # (4,): 1 / focal length (x, y) and the principal point (col, row), in pixels
+    pinhole: Floats  # (4,): 1 / focal length (x, y) and the principal point (col, row), in pixels; empty: far away
 
 
 class Task(NamedTuple):
@@ -76,7 +78,8 @@ class Task(NamedTuple):
     per_strength: Floats  # (light,): 1 / intensity
     shares: Floats  # (channel,): by how much channels count beside the surface's own colour, 1 in the mean
     believed: Floats  # (channel,): how far that colour is taken from the channel itself, 1 in the best lit one
-    near: Near  # empty where all lights are distant; else matrix and per_strength hold for the surface's middle only
+    near: Near  # but for its pinhole empty where all lights are distant; else matrix and per_strength hold for the
+    # surface's middle only
     inverse: Floats  # (light, 3): the matrix's transposed pseudo-inverse, for samples as they are; 0 for a copy
     origin: Floats  # (3,): what black samples would give with it, to be added
     least: np.float32  # the smallest 1 / intensity
@@ -199,7 +202,7 @@ def task(
         believed=_filled(np.sqrt(lit.shares / lit.shares.max()), 0),
         inverse=_filled(gain[:, :1] * inverse.T, copies),
         origin=_filled(inverse @ tone[:, 0, 1], 0),
-        near=_near(lit, unit, copies),
+        near=_near(lit, unit, copies, rows, cols),
         least=np.float32((unit / strength).min()),
         most=np.float32((unit / strength).max()),
         dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
@@ -211,22 +214,26 @@ def task(
     )
 
 
-def _near(lit: Illumination, unit: float, copies: int) -> Near:
-    field = lit.near
+def _near(lit: Illumination, unit: float, copies: int, rows: int, cols: int) -> Near:
+    field, pinhole = lit.near, _pinhole(lit.view, rows, cols)
     if field is None:
         line, plane = np.empty(0, np.float32), np.empty((0, 0), np.float32)
-        return Near(plane, np.empty(0, np.uint8), plane, line, line, plane, line)
-    ground = field.ground
-    focal, principal = ground.focal_px, ground.principal_px
+        return Near(plane, np.empty(0, np.uint8), plane, line, line, plane, pinhole)
     return Near(
         positions=_filled(field.positions_m, copies, mode="edge"),
         is_near=np.pad(_bytes(field.is_near), (0, copies)),
         axes=_filled(field.axes, copies, mode="edge"),
         anisotropy=_filled(field.anisotropy, copies),
         strengths=_filled(lit.intensities.mean(axis=1) / field.middle_gain / unit, copies),
-        depth=np.ascontiguousarray(ground.depth_m, np.float32),
-        pinhole=np.array([1 / focal[0], 1 / focal[1], *principal], np.float32),
+        depth=np.ascontiguousarray(field.ground.depth_m, np.float32),
+        pinhole=pinhole,
     )
+
+
+def _pinhole(view: View, rows: int, cols: int) -> Floats:
+    if view.focal_px is None:
+        return np.empty(0, np.float32)
+    return np.array([1 / view.focal_px[0], 1 / view.focal_px[1], *view.middle_px(rows, cols)], np.float32)
 
 
 def empty_result(pixels: int, channels: int, *, half: bool, residual: bool, spare: Path | None = None) -> Result:

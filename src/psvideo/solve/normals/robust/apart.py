@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Floats, Indices
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
-from psvideo.solve.normals.robust.equations import OUT, PLANES_OF_V, SENT
+from psvideo.solve.normals.robust.equations import OUT, PLANES_OF_V, SENT, VIEW_X, VIEW_Y, VIEW_Z
 from psvideo.solve.normals.robust.reflecting import KEPT, OF_LIGHT
 from psvideo.solve.normals.task import Task
 
@@ -25,7 +25,7 @@ class Room(NamedTuple):
     errors: Floats  # (light, pixel)
     matrix: Floats  # (light, 3, pixel): what lights send to every pixel
     per_strength: Floats  # (light, pixel)
-    ways: Floats  # (light, 5, pixel) where the subject's reflectance is known, else of no light
+    ways: Floats  # (light, 6, pixel) where the subject's reflectance is known, else of no light
     matte: Floats  # (light, pixel): measurements without highlights
     kept: Floats  # what else ``reflecting.py`` keeps
 
@@ -35,28 +35,36 @@ def memory_for_block(task: Task, *, reflecting: bool) -> Room:
     lights, channels = task.tone.shape[:2]
     values = np.full((lights * channels, BLOCK), MISSING, np.float32)
     modelled = lights if reflecting else 0
+    more = np.ones(PLANES_OF_V * BLOCK, np.float32)
+    more[VIEW_X:VIEW_Z] = 0  # a lens that is known changes it with the block
     return Room(
         planes=np.zeros(PLANES * BLOCK, np.float32),
-        more=np.ones(PLANES_OF_V * BLOCK, np.float32),
+        more=more,
         values=values,
         measurements=values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32),
         errors=np.full((lights, BLOCK), OUT, np.float32),
         matrix=np.repeat(task.matrix[..., None], BLOCK, axis=-1),  # near lights' change with the block
         per_strength=np.repeat(task.per_strength[:, None], BLOCK, axis=-1),
-        ways=np.zeros((modelled, 5, BLOCK), np.float32),
+        ways=np.zeros((modelled, 6, BLOCK), np.float32),
         matte=np.full((modelled, BLOCK), MISSING, np.float32),
         kept=np.zeros(BLOCK * (KEPT + OF_LIGHT * lights) if reflecting else 0, np.float32),
     )
 
 
 @FUSED.inlined
-def put_side_by_side(block: Room, listed: Indices, count: int, distant: bool, apart: Room, waiting: int) -> None:
-    """Copy the listed pixels of a block behind those that are ``waiting``."""
+def put_side_by_side(
+    block: Room, listed: Indices, count: int, distant: bool, lens: bool, apart: Room, waiting: int
+) -> None:
+    """Copy the listed pixels of a block behind those that are ``waiting``; lights that are not ``distant`` and views
+    through a ``lens`` are each pixel's own."""
     for plane in (X, Y, Z, COUNT, LIMIT):
         for k in range(count):
             apart.planes[plane + waiting + k] = block.planes[plane + listed[k]]
     if not distant:
         _pick(block.more[SENT:], listed, count, apart.more[SENT + waiting :])
+    if lens:
+        for plane in (VIEW_X, VIEW_Y, VIEW_Z):
+            _pick(block.more[plane:], listed, count, apart.more[plane + waiting :])
     for light in range(len(block.measurements)):
         _pick(block.measurements[light], listed, count, apart.measurements[light, waiting:])
     for plane in range(len(block.values)):
@@ -65,8 +73,8 @@ def put_side_by_side(block: Room, listed: Indices, count: int, distant: bool, ap
         for axis in range(3):
             _pick(block.matrix[light, axis], listed, count, apart.matrix[light, axis, waiting:])
         _pick(block.per_strength[light], listed, count, apart.per_strength[light, waiting:])
-    for light in range(0 if distant else len(block.ways)):
-        for number in range(5):
+    for light in range(len(block.ways) if lens else 0):
+        for number in range(6):
             _pick(block.ways[light, number], listed, count, apart.ways[light, number, waiting:])
 
 
@@ -77,9 +85,9 @@ def _pick(plane: Floats, listed: Indices, n: int, into: Floats) -> None:
 
 
 @FUSED.inlined
-def fill_up(apart: Room, waiting: int, distant: bool, listed: Indices) -> int:
+def fill_up(apart: Room, waiting: int, distant: bool, lens: bool, listed: Indices) -> int:
     """Copy the first pixel behind the others up to whole vectors; return how many pixels that makes."""
     more = -waiting % WHOLE
     listed[:more] = np.uint32(0)
-    put_side_by_side(apart, listed, more, distant, apart, waiting)
+    put_side_by_side(apart, listed, more, distant, lens, apart, waiting)
     return waiting + more

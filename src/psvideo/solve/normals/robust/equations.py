@@ -34,9 +34,11 @@ HALVINGS = 6  # a quantile is found to a 64th of the interval that holds it
 OUT = np.float32(1e30)  # beyond every interval: stands for what is MISSING
 
 # Planes of v: an interval (FROM, TO) around the value of that RANK; what the steps hand on; COUNTED is scratch; SENT is
-# what lights send to a pixel in the mean, over what they send to the middle of the picture (distant ones: 1).
+# what lights send to a pixel in the mean, over what they send to the middle of the picture (distant ones: 1); VIEW is
+# the unit vector to the camera (along its axis where the lens is not known).
 FROM, TO, RANK, COUNTED, LOWER, UPPER, SCALE, ODD, DOUBT, SENT = (BLOCK * plane for plane in range(10))
-PLANES_OF_V = 10
+VIEW_X, VIEW_Y, VIEW_Z = (BLOCK * plane for plane in range(10, 13))
+PLANES_OF_V = 13
 RIGHT_X, RIGHT_Y, RIGHT_Z = LOW, HIGH, SUM  # the equations' right sides, in planes of w that are free by now
 
 
@@ -97,6 +99,17 @@ def fill_sent(per_strength: Floats, lights: int, v: Floats, n: int) -> None:
         per = per_strength[light]
         for i in range(n):
             v[SENT + i] += ONE / (np.float32(lights) * per[i])
+
+
+@FUSED.called
+def fill_view(pinhole: Floats, row: int, col: int, v: Floats, n: int) -> None:
+    """VIEW of n pixels of a row from ``col`` on, through a pinhole as in ``task.Near``."""
+    across, down, middle_col, middle_row = pinhole
+    y = (np.float32(row) - middle_row) * down
+    for i in range(n):
+        x = (middle_col - np.float32(col + i)) * across
+        one = ONE / np.sqrt(x * x + y * y + ONE)
+        v[VIEW_X + i], v[VIEW_Y + i], v[VIEW_Z + i] = x * one, y * one, one
 
 
 @FUSED.called

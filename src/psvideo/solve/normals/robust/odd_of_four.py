@@ -12,7 +12,18 @@ from psvideo.compute.symmetric import adjugate
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.robust.equations import DOUBT, LOWER, ODD, RANK, SENT, add_equations, solve_equations
+from psvideo.solve.normals.robust.equations import (
+    DOUBT,
+    LOWER,
+    ODD,
+    RANK,
+    SENT,
+    VIEW_X,
+    VIEW_Y,
+    VIEW_Z,
+    add_equations,
+    solve_equations,
+)
 from psvideo.solve.normals.task import Task
 
 TWO, FOUR = np.float32(2), np.float32(4)
@@ -47,9 +58,10 @@ def drop_odd_of_four(
         lamp = of_light(task.matrix, light)
         for i in range(n):
             x, y, z = at(lamp, i)
-            to_mirror = ONE / np.sqrt(x * x + y * y + (z + np.sqrt(x * x + y * y + z * z)) ** 2)
-            half_x, half_y = x * to_mirror, y * to_mirror
-            half_z = (z + np.sqrt(x * x + y * y + z * z)) * to_mirror
+            size = np.sqrt(x * x + y * y + z * z)
+            half_x, half_y, half_z = x + size * v[VIEW_X + i], y + size * v[VIEW_Y + i], z + size * v[VIEW_Z + i]
+            to_mirror = ONE / np.sqrt(half_x * half_x + half_y * half_y + half_z**2)
+            half_x, half_y, half_z = half_x * to_mirror, half_y * to_mirror, half_z * to_mirror
             nearness = _nearness_without(w, v, i, x, y, z, e[light, i], half_x, half_y, half_z)
             better = (e[light, i] > ZERO) & (nearness > v[BEST + i])
             v[BEST + i] = nearness if better else v[BEST + i]

@@ -64,8 +64,9 @@ def points_at(
     rows, where = np.unique(at[0], return_inverse=True)
     samples = np.stack([rows_of(plate, rows)[where, at[1]] for plate in plates]).astype(np.float64)
     here = np.ones(samples.shape[:2], bool) if seen is None else _seen(seen, at)
+    to_camera = lit.view.towards_camera(at, *plates[0].shape[:2])
     unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    return _points((samples - black_level) * scale, lit, at, here, usable, unit)
+    return _points((samples - black_level) * scale, lit, at, here, usable, unit, to_camera)
 
 
 def _sure(unsure: Floats, found: Surface, rows: NDArray[np.intp], lit: Illumination) -> Mask:
@@ -89,7 +90,7 @@ def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:
 
 def _points(
     samples: Doubles, lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]], seen: Mask, usable: Usable,
-    normals: Doubles,
+    normals: Doubles, to_camera: Doubles,
 ) -> SubjectPoints:  # fmt: skip
     samples = samples.reshape(*samples.shape[:2], -1)
     sent = _sent(lit, at)
@@ -101,13 +102,14 @@ def _points(
     mean = (np.maximum(measured, 0) * here).sum(axis=0) / np.maximum(here.sum(axis=0), 1)
     least = np.maximum(usable.dark_level / lit.intensities.mean(), usable.shadow_ratio * mean)
     towards = sent / size[..., None]
-    half = towards + np.array([0.0, 0.0, 1.0])
+    half = towards + to_camera
     half /= np.linalg.norm(half, axis=-1, keepdims=True)
     return SubjectPoints(
         measured=measured,
         counts=(here & (measured > least)).astype(float),
         towards=towards,
         half=half,
+        to_camera=to_camera,
         normals=normals,
     )
 

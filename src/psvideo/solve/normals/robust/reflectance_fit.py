@@ -49,13 +49,14 @@ OUTLYING = 3.0
 @dataclass(frozen=True, kw_only=True)
 class SubjectPoints:
     """Points of the subject: measurements (light, point) in units of every light's strength, which of them count
-    (0 or 1), directions to the lights (light, point, 3), and half way from there to the camera; and ``normals``
-    (point, 3) as the points were solved without a model."""
+    (0 or 1), directions to the lights (light, point, 3), and half way from there to the camera; ``to_camera``
+    (point, 3); and ``normals`` (point, 3) as the points were solved without a model."""
 
     measured: Doubles
     counts: Doubles
     towards: Doubles
     half: Doubles
+    to_camera: Doubles
     normals: Doubles
 
     def only(self, known: Mask) -> "SubjectPoints":
@@ -65,6 +66,7 @@ class SubjectPoints:
             counts=self.counts[:, known],
             towards=self.towards[:, known],
             half=self.half[:, known],
+            to_camera=self.to_camera[known],
             normals=self.normals[known],
         ).in_order()
 
@@ -82,6 +84,7 @@ def joined(looks: Sequence[SubjectPoints]) -> SubjectPoints:
         counts=np.concatenate([one.counts for one in looks], axis=1),
         towards=np.concatenate([one.towards for one in looks], axis=1),
         half=np.concatenate([one.half for one in looks], axis=1),
+        to_camera=np.concatenate([one.to_camera for one in looks]),
         normals=np.concatenate([one.normals for one in looks]),
     )
 
@@ -173,7 +176,7 @@ def _parts(points: SubjectPoints, g: Doubles, typical: float) -> Doubles:
     from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
 
     parts = np.empty((1 + NUMBERS, *points.measured.shape))
-    fill_parts(points.measured, points.towards, points.half, g, typical, parts)
+    fill_parts(points.measured, points.towards, points.half, points.to_camera, g, typical, parts)
     return parts
 
 
@@ -228,5 +231,6 @@ def _solved_again(points: SubjectPoints, g: Doubles, model: Doubles, typical: fl
     from psvideo.solve.normals.robust.reflectance_kernel import solve_again
 
     found = np.empty_like(g)
-    solve_again(points.measured, points.counts, points.towards, points.half, g, model, typical, found)
+    ways = points.towards, points.half, points.to_camera
+    solve_again(points.measured, points.counts, *ways, g, model, typical, found)
     return found

@@ -1,6 +1,6 @@
 """The reflectance fit's loops over points and lights, compiled: numpy takes longer to call than to add up so few.
 
-Arrays are those of ``reflectance_fit.SubjectPoints``: (light, point), directions (light, point, 3).
+Arrays are those of ``reflectance_fit.SubjectPoints``: (light, point), directions (light, point, 3) and (point, 3).
 """
 
 import numpy as np
@@ -68,6 +68,11 @@ def _along(ways: Doubles, light: int, point: int, normal: Doubles) -> float:
 
 
 @FUSED.inlined
+def _facing(to_camera: Doubles, point: int, way: Doubles) -> float:
+    return float(to_camera[point, 0] * way[0] + to_camera[point, 1] * way[1] + to_camera[point, 2] * way[2])
+
+
+@FUSED.inlined
 def _size_and_normal(g: Doubles, point: int, normal: Doubles) -> float:
     size = float(np.sqrt(g[point, 0] ** 2 + g[point, 1] ** 2 + g[point, 2] ** 2))
     for i in range(3):
@@ -76,12 +81,14 @@ def _size_and_normal(g: Doubles, point: int, normal: Doubles) -> float:
 
 
 @FUSED.kept
-def fill_parts(measured: Doubles, towards: Doubles, half: Doubles, g: Doubles, typical: float, parts: Doubles) -> None:
+def fill_parts(
+    measured: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles, typical: float, parts: Doubles
+) -> None:
     """Fill ``parts`` (part, light, point): what was measured, in albedos, and what each number of the model adds."""
     normal = np.empty(3)
     for p in range(len(g)):
         size = _size_and_normal(g, p, normal)
-        bright = min(typical / size, MOST_BRIGHT)
+        bright, facing = min(typical / size, MOST_BRIGHT), _facing(to_camera, p, normal)
         for light in range(len(measured)):
             c, h = _along(towards, light, p, normal), max(_along(half, light, p, normal), 0.0)
             lit = 1.0 if c > 0.0 else 0.0
@@ -89,7 +96,7 @@ def fill_parts(measured: Doubles, towards: Doubles, half: Doubles, g: Doubles, t
             h32 = (h8 * h8) ** 2
             parts[0, light, p] = measured[light, p] / size
             parts[1, light, p] = c * c * lit
-            parts[2, light, p] = _roughness(c, normal[2], towards[light, p, 2])[0]
+            parts[2, light, p] = _roughness(c, facing, _facing(to_camera, p, towards[light, p]))[0]
             parts[3, light, p] = lit * bright * h8
             parts[4, light, p] = lit * bright * h32
             parts[5, light, p] = lit * bright * (h32 * h32) ** 2
@@ -175,8 +182,8 @@ def _typical(rest: Doubles, counts: Doubles, point: int, order: Doubles) -> floa
 
 @FUSED.kept
 def solve_again(
-    measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, g: Doubles, model: Doubles, typical: float,
-    found: Doubles,
+    measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles,
+    model: Doubles, typical: float, found: Doubles,
 ) -> None:  # fmt: skip
     """Fill ``found`` with g (point, 3) after a step of reweighted Gauss and Newton under the model."""
     lights = len(measured)
@@ -184,13 +191,14 @@ def solve_again(
     rows, matte, rest, order = np.empty((lights, 3)), np.empty(lights), np.empty(lights), np.empty(lights)
     for p in range(len(g)):
         size = _size_and_normal(g, p, normal)
-        bright = min(typical / size, MOST_BRIGHT)
+        bright, facing = min(typical / size, MOST_BRIGHT), _facing(to_camera, p, normal)
         many = 0.0
         for light in range(lights):
             many += counts[light, p]
             c, h = _along(towards, light, p, normal), max(_along(half, light, p, normal), 0.0)
             lit = 1.0 if c > 0.0 else 0.0
-            added, added_by_c, added_by_z = _roughness(c, normal[2], towards[light, p, 2])
+            towards_camera = _facing(to_camera, p, towards[light, p])
+            added, added_by_c, added_by_facing = _roughness(c, facing, towards_camera)
             h7 = h * h * h * (h * h) ** 2
             h31 = h7 * ((h7 * h) ** 2 * (h7 * h))
             h127 = h31 * ((h31 * h) ** 2 * (h31 * h))
@@ -198,12 +206,12 @@ def solve_again(
             broad, middle, narrow = much * model[2], much * model[3], much * model[4]
             matte[light] = measured[light, p] - size * h * (broad * h7 + middle * h31 + narrow * h127)
             by_h = 8 * broad * h7 + 32 * middle * h31 + 128 * narrow * h127
-            by_c, by_z = 1 + 2 * model[0] * lit * c + model[1] * added_by_c, model[1] * added_by_z
+            by_c, by_facing = 1 + 2 * model[0] * lit * c + model[1] * added_by_c, model[1] * added_by_facing
             shade = c + model[0] * lit * c * c + model[1] * added
-            along = shade - by_c * c - by_h * h - by_z * normal[2]
+            along = shade - by_c * c - by_h * h - by_facing * facing
             for i in range(3):
                 rows[light, i] = along * normal[i] + by_c * towards[light, p, i] + by_h * half[light, p, i]
-            rows[light, 2] += by_z
+                rows[light, i] += by_facing * to_camera[p, i]
             rest[light] = abs(matte[light] - size * shade)
         spread = max(_typical(rest, counts, p, order), LEAST_SHARE * size)
         width = WIDTH * min(1.0, np.sqrt(FEW / max(many, FEW)))

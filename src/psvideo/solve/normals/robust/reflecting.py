@@ -12,7 +12,7 @@ from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, COUNT, MISSING, ONE, TINY, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.robust.any_lights import add_weighted, fill_residuals, find_scale
-from psvideo.solve.normals.robust.equations import OUT, SCALE, solve_equations
+from psvideo.solve.normals.robust.equations import OUT, SCALE, VIEW_X, VIEW_Y, VIEW_Z, solve_equations
 from psvideo.solve.normals.task import BROAD, MIDDLE, NARROW, Weights
 
 STEPS = 4
@@ -25,21 +25,23 @@ LEAST_FACING = np.float32(0.05)  # of the cosines that roughness is divided by
 LEAST_BRIGHT = np.float32(0.55)  # of what is less, high powers are nothing, and numbers too small to be quick
 _MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
 _UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN, _SHINE = (BLOCK * k for k in range(10, 16))
-KEPT, OF_LIGHT = 16, 4
+_TO_X, _TO_Y, _TO_Z, _FACING = (BLOCK * k for k in range(16, 20))
+KEPT, OF_LIGHT = 20, 4
 """Planes that ``reflecting`` keeps of a block: this many, then this many per light, its gradient and its shine."""
 _SOUND_SQUARED = np.float32(1e4)
 
 
 @FUSED.called
-def find_ways(matrix: Floats, per_strength: Floats, ways: Floats, n: int) -> None:
-    """What the model needs to know of the lights (light, 5, pixel): unit directions, what makes a unit vector of the
-    sum with the camera's, strengths (0 of a copy)."""
+def find_ways(matrix: Floats, per_strength: Floats, v: Floats, ways: Floats, n: int) -> None:
+    """What the model needs to know of the lights (light, 6, pixel): unit directions, what makes a unit vector of the
+    sum with the camera's, strengths (0 of a copy), cosines to the way to the camera."""
     for light in range(len(ways)):
         lamp, per, way = of_light(matrix, light), per_strength[light], ways[light]
         for i in range(n):
             (x, y, z), one = at(lamp, i), at(per, i)
             way[0, i], way[1, i], way[2, i] = x * one, y * one, z * one
-            way[3, i] = ONE / np.sqrt(TWO + TWO * z * one)
+            way[5, i] = x * one * v[VIEW_X + i] + y * one * v[VIEW_Y + i] + z * one * v[VIEW_Z + i]
+            way[3, i] = ONE / np.sqrt(TWO + TWO * way[5, i])
             way[4, i] = ONE / one if x * x + y * y + z * z > ZERO else ZERO
 
 
@@ -61,7 +63,7 @@ def reflect(
         kept[_SPREAD + i], kept[HOLDS + i] = ONE / (FAR_OFF * v[SCALE + i]), ONE
     _add_up(kept, _BEFORE, e, n)
     for step in range(STEPS):
-        _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
+        _fill_gradient(ways, lights, weights, kept, matte, w, v, m, n)
         for i in range(n):
             kept[_OLD_X + i], kept[_OLD_Y + i], kept[_OLD_Z + i] = w[X + i], w[Y + i], w[Z + i]
         if step == 0:
@@ -71,7 +73,7 @@ def reflect(
         add_weighted(gradient, weights.tukey, weights.width, False, w, v, matte, e, n)
         solve_equations(w, n, _SOUND_SQUARED, True)
         _shorten(kept, w, n)
-    _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
+    _fill_gradient(ways, lights, weights, kept, matte, w, v, m, n)
     fill_residuals(gradient, w, matte, e, n)
     _add_up(kept, _AFTER, e, n)
     unseen = ONE if weights.rough > ZERO else ZERO
@@ -92,7 +94,7 @@ def weigh_reflecting(
     """SCALE and the weighted normal equations under the model as far as it holds; values (light * channel, pixel) are
     left without what the model adds, for the albedo."""
     gradient = kept[BLOCK * KEPT :].reshape(len(ways), OF_LIGHT, BLOCK)
-    _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
+    _fill_gradient(ways, lights, weights, kept, matte, w, v, m, n)
     find_scale(gradient, weights.least, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
     _take_off(ways, lights, weights, kept, values, n)
@@ -164,7 +166,7 @@ def _rough(cosine: np.float32, facing: np.float32, towards: np.float32) -> tuple
 
 @FUSED.called
 def _fill_gradient(
-    ways: Floats, lights: int, weights: Weights, kept: Floats, matte: Floats, w: Floats, m: Floats, n: int
+    ways: Floats, lights: int, weights: Weights, kept: Floats, matte: Floats, w: Floats, v: Floats, m: Floats, n: int
 ) -> None:
     """What each measurement gains by a little more of g, in each direction, at g; and measurements without shine.
 
@@ -175,27 +177,32 @@ def _fill_gradient(
         per_size = ONE / np.sqrt(max(a * a + b * b + c * c, TINY * TINY))
         kept[_UNIT_X + i], kept[_UNIT_Y + i], kept[_UNIT_Z + i] = a * per_size, b * per_size, c * per_size
         kept[_PER_SIZE + i] = per_size
+        x, y, z = v[VIEW_X + i], v[VIEW_Y + i], v[VIEW_Z + i]
+        kept[_TO_X + i], kept[_TO_Y + i], kept[_TO_Z + i] = x, y, z
+        kept[_FACING + i] = kept[_UNIT_X + i] * x + kept[_UNIT_Y + i] * y + kept[_UNIT_Z + i] * z
     for light in range(lights):
         begin = BLOCK * (KEPT + OF_LIGHT * light)
         way, line = ways[light], kept[begin : begin + BLOCK * OF_LIGHT]
         for i in range(n):
             a, b, c, per_size = kept[_UNIT_X + i], kept[_UNIT_Y + i], kept[_UNIT_Z + i], kept[_PER_SIZE + i]
-            dx, dy, dz, to_half, strength = way[0, i], way[1, i], way[2, i], way[3, i], way[4, i]
+            dx, dy, dz, to_half, strength, towards = way[0, i], way[1, i], way[2, i], way[3, i], way[4, i], way[5, i]
+            x, y, z, facing = kept[_TO_X + i], kept[_TO_Y + i], kept[_TO_Z + i], kept[_FACING + i]
             cosine = a * dx + b * dy + c * dz
-            half = max((cosine + c) * to_half, ZERO)
+            half = max((cosine + facing) * to_half, ZERO)
             holds = kept[HOLDS + i] if cosine > ZERO else ZERO
             much, more = _shine(weights, half)
             curve, by_half = weights.curve * holds, more * holds * per_size
-            added, rough_by_cosine, by_z = _rough(cosine, c, dz)
+            added, rough_by_cosine, by_facing = _rough(cosine, facing, towards)
             rough = weights.rough * holds
             by_cosine = ONE + TWO * curve * cosine + rough * rough_by_cosine
-            by_z *= rough
+            by_facing *= rough
             along = cosine + curve * cosine * cosine + rough * added
-            along -= by_cosine * cosine + by_half * half + by_z * c
+            along -= by_cosine * cosine + by_half * half + by_facing * facing
             by_half *= to_half
-            line[i] = strength * (along * a + (by_cosine + by_half) * dx)
-            line[BLOCK + i] = strength * (along * b + (by_cosine + by_half) * dy)
-            line[2 * BLOCK + i] = strength * (along * c + (by_cosine + by_half) * dz + by_half + by_z)
+            by_light = by_cosine + by_half
+            line[i] = strength * (along * a + by_light * dx + by_half * x + by_facing * x)
+            line[BLOCK + i] = strength * (along * b + by_light * dy + by_half * y + by_facing * y)
+            line[2 * BLOCK + i] = strength * (along * c + by_light * dz + by_half * z + by_facing * z)
             line[3 * BLOCK + i] = strength * holds * much
         there, without = m[light], matte[light]
         for i in range(n):
@@ -206,19 +213,19 @@ def _fill_gradient(
 def _take_off(ways: Floats, lights: int, weights: Weights, kept: Floats, values: Floats, n: int) -> None:
     """Leave of every sample what a matte surface would show: highlights are alike in all channels, the curve is not.
 
-    The unit normals are those that ``_fill_gradient`` left.
+    The unit normals, and how they face the camera, are those that ``_fill_gradient`` left.
     """
     channels = len(values) // len(ways)
     for light in range(lights):
         way = ways[light]
         for i in range(n):
-            c = kept[_UNIT_Z + i]
-            cosine = kept[_UNIT_X + i] * way[0, i] + kept[_UNIT_Y + i] * way[1, i] + c * way[2, i]
-            half = max((cosine + c) * way[3, i], ZERO)
+            facing = kept[_FACING + i]
+            cosine = kept[_UNIT_X + i] * way[0, i] + kept[_UNIT_Y + i] * way[1, i] + kept[_UNIT_Z + i] * way[2, i]
+            half = max((cosine + facing) * way[3, i], ZERO)
             holds = kept[HOLDS + i] if cosine > ZERO else ZERO
             much, _ = _shine(weights, half)
             kept[_SHINE + i] = holds * much * way[4, i]
-            share = _rough_share(cosine, c, way[2, i])
+            share = _rough_share(cosine, facing, way[5, i])
             kept[_GAIN + i] = ONE / (ONE + holds * (weights.curve * cosine + weights.rough * share))
         for channel in range(channels):
             plane = values[light * channels + channel]

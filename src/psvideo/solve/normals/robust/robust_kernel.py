@@ -17,7 +17,7 @@ from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usab
 from psvideo.solve.normals.loops.near_kernel import lent_task, place_lights
 from psvideo.solve.normals.loops.storing import store_block
 from psvideo.solve.normals.robust.apart import Room, fill_up, memory_for_block, put_side_by_side
-from psvideo.solve.normals.robust.equations import DOUBT, fill_sent
+from psvideo.solve.normals.robust.equations import DOUBT, fill_sent, fill_view
 from psvideo.solve.normals.robust.explained import list_unexplained, solve_plainly
 from psvideo.solve.normals.robust.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
 from psvideo.solve.normals.robust.reflecting import find_ways
@@ -83,9 +83,9 @@ def solve_rows(
         lent(memory.block.normals), lent(memory.block.albedo), lent(memory.block.valid), lent(memory.block.residual)
     )
     sent, per = lent(task.matrix), lent(task.per_strength)
-    distant = t.near.depth.size == 0
+    distant, lens = t.near.depth.size == 0, t.near.pinhole.size > 0
     for room in (whole, apart):
-        find_ways(room.matrix, room.per_strength, room.ways, BLOCK)  # near lights' change with the block
+        find_ways(room.matrix, room.per_strength, room.more, room.ways, BLOCK)  # through a lens they change
     places = lent(memory.places)
     for row in range(-(-first // step) * step, last, step):
         waiting = 0
@@ -99,7 +99,7 @@ def solve_rows(
                 summed, weighed, odd = _solve_block(t, sent, per, weights, whole, listed, row, col, n)
             for k in range(odd):
                 places[waiting + k] = start + listed[k]
-            put_side_by_side(whole, listed, odd, distant, apart, waiting)
+            put_side_by_side(whole, listed, odd, distant, lens, apart, waiting)
             waiting += odd
             values, m, e = whole.values, whole.measurements, whole.errors
             store_block(t, block, w, values, m, e, 0, n, summed, weighed)
@@ -107,7 +107,7 @@ def solve_rows(
                 listed[i] = start + i
             _hand_out(block, v, out, predicted, unexplained, half, listed, n)
             if waiting and (waiting >= STEP or col + STEP >= t.cols):
-                n = fill_up(apart, waiting, distant, listed)
+                n = fill_up(apart, waiting, distant, lens, listed)
                 _solve_apart(t_apart, sent, per, weights, apart, n)
                 values, m, e = apart.values, apart.measurements, apart.errors
                 store_block(t_apart, block, apart.planes, values, m, e, 0, n, False, True)
@@ -221,7 +221,9 @@ def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) 
     if not distant:
         place_lights(task.matrix, task.per_strength, task.near, row, col, n)
         fill_sent(task.per_strength, task.lights, room.more, n)
-        find_ways(task.matrix, task.per_strength, room.ways, n)
+    if task.near.pinhole.size:
+        fill_view(task.near.pinhole, row, col, room.more, n)
+        find_ways(task.matrix, task.per_strength, room.more, room.ways, n)
     plain = distant and task.tone.shape[1] == 3 and all_seen(task.seen, row, col, n)
     summed = plain and solve_colours(task, w, values, m, row * task.cols + col, n)
     if summed:
