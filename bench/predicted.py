@@ -31,11 +31,11 @@ from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.judging import SURE, Judging, looked_at
 from psvideo.solve.normals.trust.signs import Signs
 
-COUNTS = (5, 8, 12, 12, 24, 48, 96)
-"""So many lights of a subject's, three sets of each."""
+COUNTS = (5, 8, 12, 12, 24, 48, 96, 4)
+"""So many lights of a subject's, three sets of each. Four are solved by least squares."""
 FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane, up to what solving accepts."""
-FITTED = ("misfit_deg", "misfit_power", "little_deg", "few_power", "indirect", "torn", "torn_beside")
+FITTED = ("misfit_deg", "misfit_power", "little_deg", "few_power", "plain", "indirect", "torn", "torn_beside")
 MOST_OVER, OF_OVER = 0.02, 3.0
 """Of what is trusted, the share that may be off by more than 10 degrees, and how much more of it counts."""
 POINTS = 400
@@ -89,11 +89,11 @@ def rows() -> Iterator[Held]:
     for subject in dict.fromkeys(each.subject for each in seen):
         how = fitted([each for each in seen if each.subject != subject])
         own = [each for each in seen if each.subject == subject]
-        for few, most, flat in ((5, 8, False), (12, 12, False), (13, 96, False), (5, 12, True)):
+        for few, most, flat in ((4, 4, False), (5, 8, False), (12, 12, False), (13, 96, False), (5, 12, True)):
             sets = [each for each in own if few <= each.lights <= most and each.flat == flat]
             if sets:
                 now, other = _held(sets, Doubting()), _held(sets, how)
-                said = ("12" if few == most else f"{few} to {most}") + (", nearly in a plane" if flat else "")
+                said = (f"{few}" if few == most else f"{few} to {most}") + (", nearly in a plane" if flat else "")
                 met = bool(60 <= now[0] <= 76 and now[1] >= 90 and now[5] <= 3)
                 yield Held(subject, said, _words(now), _words(other), "60-76 %, 90 %, <= 3 % over 10°", met)
 

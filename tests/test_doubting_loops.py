@@ -120,6 +120,7 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
         noise_deg=noise_deg,
         lost_deg=noise_deg * np.sqrt(wider - 1),
         hidden=of_signs.hidden_by(lights) / of_signs.hidden_by(of_signs.ENOUGH_LIGHTS),
+        plain=plain,
     )
 
 
@@ -151,7 +152,8 @@ def torn_in_numpy(points: ThinSurface) -> np.ndarray:
 
 def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
     def of(misfit_deg: np.ndarray, torn_deg: np.ndarray) -> np.ndarray:
-        misfit = how.misfit_deg * signs.hidden**how.few_power * misfit_deg ** (1 + how.misfit_power)
+        counts = how.misfit_deg * (how.plain if signs.plain else signs.hidden**how.few_power)
+        misfit = counts * misfit_deg ** (1 + how.misfit_power)
         misfit /= misfit_deg + how.little_deg
         misfit -= signs.uneven * np.maximum(misfit - misfit_deg, 0)
         both = np.hypot(np.hypot(misfit, how.indirect * signs.indirect_deg), signs.unchecked_deg)

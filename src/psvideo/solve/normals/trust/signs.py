@@ -42,12 +42,12 @@ class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals surely predict beyond noise, by which
     angle light from around would turn the normal, by which normals around surely belong to no surface, and what noise
     makes more where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is
-    not matte. ``uneven``: the share of the misfit that changes from sample to sample, as errors of codecs do and
-    surfaces do not: of that nothing is hidden. ``likely_misfit_deg``, ``likely_torn_deg``: the first and third without
-    a margin for what noise could be instead; ``noise_deg`` is what noise makes of the normals. ``unchecked_deg``: what
-    lights that cannot be held against each other leave of real surfaces, though nothing shows; it counts in errors, and
-    not in what is trusted. ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals
-    under four and five lights (``few_checked.py``)."""
+    not matte; ``plain``: whether residuals are of least squares. ``uneven``: the share of the misfit that changes from
+    sample to sample, as errors of codecs do and surfaces do not: of that nothing is hidden. ``likely_misfit_deg``,
+    ``likely_torn_deg``: the first and third without a margin for what noise could be instead; ``noise_deg`` is what
+    noise makes of the normals. ``unchecked_deg``: what lights that cannot be held against each other leave of real
+    surfaces, though nothing shows; it counts in errors, and not in what is trusted. ``by_model_deg``: by how much the
+    model of the subject's reflectance would turn the normals under four and five lights (``few_checked.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -57,6 +57,7 @@ class Signs:
     likely_misfit_deg: Floats
     likely_torn_deg: Floats
     noise_deg: Floats
+    plain: bool = False
     uneven: Floats | float = 0.0
     unchecked_deg: Floats | float = 0.0
     by_model_deg: Floats | float = 0.0
@@ -64,7 +65,7 @@ class Signs:
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
         shape = self.misfit_deg.shape
-        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "hidden"}
+        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("hidden", "plain")}
         here: dict[str, Any] = {name: np.broadcast_to(value, shape)[some] for name, value in each.items()}
         return replace(self, **here)
 
@@ -103,6 +104,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         noise_deg=points.noise_deg,
         lost_deg=points.noise_deg * np.sqrt(wider - 1)[used],
         hidden=hidden_by(lights) / hidden_by(ENOUGH_LIGHTS),
+        plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
     )
 
