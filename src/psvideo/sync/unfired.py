@@ -3,8 +3,8 @@
 Where a flash is missing, the picture shows at its time what a dark slot shows. Every flash gets a gain of its own on
 what its light gives: rows' brightnesses are fitted under the gains, and the gains under the brightnesses, in turns, so
 that a light that is dead for half of the clip counts as one that gives nothing then, and not as half as bright. A gain
-near none is a missing flash where other lights go on flashing around it; a subject that leaves the picture takes the
-light of all.
+near none is a missing flash where flashes before and after it gave light; a subject that leaves the picture takes the
+light of all that follow.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,9 +32,9 @@ NONE = 0.2
 """A flash that gives less than this share of what its light gives elsewhere, as the flashes around it do, has not
 fired."""
 AROUND = 3
-"""Flashes before and after that show whether other lights go on;"""
+"""Lit flashes before and after, or a round of them, that show whether light goes on;"""
 GOES_ON = 0.5
-"""they do where they give this share of their own light."""
+"""it does where one on either side gives this share of its own light."""
 SEEN = 0.2
 """Rows must have seen this much of a flash, as a share of its squared light, to show whether it fired."""
 SURE = 4.0
@@ -109,14 +109,15 @@ def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[NDArray[
             share[slot == one] = levels.value[slot == one] / level
             error[slot == one] = levels.error[slot == one] / level
     known = np.where([flash.complete for flash in lit], share, np.nan)
-    around = _around(known, slot)
+    around = _around(known, max(AROUND, len(plan.lit_slots)))
+    fires = share > GOES_ON
     share, error = share / around, error / around
     off = (share < NONE) & (around > GOES_ON) & (share + SURE * error < GOES_ON)
     for one in plan.lit_slots:
         fired = share[(slot == one) & (share > GOES_ON)]
         scatter = 1.4826 * float(np.median(np.abs(fired - np.median(fired)))) if len(fired) >= LEAST_FIRED else np.inf
         off &= (slot != one) | (1 - share > SURE * scatter)
-    return off, np.isfinite(share) & (around > GOES_ON)
+    return off, np.isfinite(share) & (fires | (around > GOES_ON))
 
 
 def _usual(level: Doubles) -> float:
@@ -127,18 +128,22 @@ def _usual(level: Doubles) -> float:
     return float(np.median(known[known >= GOES_ON * np.percentile(known, 95)], keepdims=True)[0])
 
 
-def _around(share: Doubles, slot: Integers) -> Doubles:
-    """Return what flashes of other lights give just before and after each one, shape (flash,)."""
-    beside = [n for n in range(-AROUND, AROUND + 1) if n]
-    at = np.arange(len(share))[:, None] + np.array(beside)
+def _around(share: Doubles, reach: int) -> Doubles:
+    """Return what flashes that fired give of their own light just before and after each one, shape (flash,).
+
+    A ``share`` (flash,) is NaN where it is not known. Those that give less than half of the most on either side, or of
+    the lesser of the two, did not fire themselves: ``1 1 0 0 0 1 1`` are three flashes in whose place light went on,
+    ``1 1 0 0 0 0 0`` may be a subject that left.
+    """
+    beside = np.array([n for n in range(-reach, reach + 1) if n])
+    at = np.arange(len(share))[:, None] + beside
     inside = (at >= 0) & (at < len(share))
-    at = np.clip(at, 0, len(share) - 1)
-    others = inside & np.isfinite(share[at])
-    if len(np.unique(slot)) > 1:
-        others &= slot[at] != slot[:, None]
-    near = np.where(others, share[at], np.nan)
-    near[~others.any(axis=1)] = 0.0
-    found: Doubles = np.maximum(np.nanmedian(near, axis=1), 1e-9)
+    near = np.where(inside, share[np.clip(at, 0, len(share) - 1)], np.nan)
+    most = np.stack([np.fmax.reduce(near[:, side], axis=1) for side in (beside < 0, beside > 0)])
+    goes_on = np.nan_to_num(np.fmin.reduce(most, axis=0))
+    fired = np.where(near >= GOES_ON * goes_on[:, None], near, np.nan)
+    fired[np.isnan(fired).all(axis=1)] = 0.0
+    found: Doubles = np.maximum(np.minimum(np.nanmedian(fired, axis=1), goes_on), 1e-9)
     return found
 
 
@@ -271,6 +276,6 @@ def remarks_on_unfired(
         shown = ", ".join(str(number) for number in frames[:MOST_NAMED]) + (" …" if len(frames) > MOST_NAMED else "")
         where = f"none after frame {frames[0]}" if len(own) > 1 and last_s < own[0].start_s else f"in frames {shown}"
         yield (
-            f"{'+'.join(lit)}: {counted(len(own), 'flash')} never fired ({where}), where the other lights went on. "
+            f"{'+'.join(lit)}: {counted(len(own), 'flash')} never fired ({where}), where flashes before and after did. "
             "They are marked as incomplete and give no plate: check this light, its wiring and its power."
         )

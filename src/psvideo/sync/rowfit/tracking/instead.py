@@ -1,8 +1,8 @@
-"""A flash that never fired, or a black frame, beside a dark slot: what is dark looks repeated, and is not.
+"""Flashes that never fired, or a black frame, beside a dark slot: what is dark looks repeated, and is not.
 
-Taken for repeated, it leaves its own place in time empty, or the next frame's: a repeat and a hole that cancel within a
-few frames. Where one missing flash, or one black frame, explains these frames as well at the places that numbering
-gives them, it is that.
+Taken for repeated, it leaves its own place in time empty, or the next frame's: repeats and holes that cancel within a
+few frames. Where a few missing flashes in a row, or one black frame, explain these frames as well at the places that
+numbering gives them, it is that.
 """
 
 from collections.abc import Iterator
@@ -19,8 +19,10 @@ from psvideo.sync.rowfit.tracking.holes import MEMORY, NATURAL
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 
-LONGEST = 4
-"""Frames at most between a hole and the repeat that cancels it."""
+LONGEST = 6
+"""Frames at most that holes and repeats displace until they have cancelled one another."""
+MOST_MISSING = 3
+"""Flashes in a row that may all be missing, dark slots between them not counted."""
 BESIDE = 2
 """Frames on either side that may see some of the same flash."""
 
@@ -39,17 +41,30 @@ def without_false_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack) -> Fr
 
 
 def _cancelled(index: Integers, numbered: Integers) -> Iterator[slice]:
-    """Yield the stretches of frames that are displaced between a hole and a repeat that cancel one another."""
+    """Yield the stretches of frames that are displaced between holes and repeats that cancel one another.
+
+    ``more`` is by how much frames lie later than their numbers say. A dark slot and two flashes that never fired, all
+    of it dark, taken for a hole of 2 and two frames that are repeated (below), or for two repeats and a hole of 2::
+
+        frame     23  24  25  26  27  28
+        numbered  23  24  25  26  27  28
+        index     23  24  27  27  27  28
+        more       0   0   2   1   0   0
+                      [ 25, 26 ]            are displaced; from 27 on all is as before
+    """
     more = index - numbered
-    displaced = np.flatnonzero(np.diff(more))
-    for before, after in zip(displaced[:-1].tolist(), displaced[1:].tolist(), strict=True):
-        repeated = (np.diff(index[[before, before + 1]]) == 0)[0] or (np.diff(index[[after, after + 1]]) == 0)[0]
-        if repeated and after - before <= LONGEST and more[before] == more[after + 1]:
-            yield slice(before + 1, after + 1)
+    for before in np.flatnonzero(np.diff(more)).tolist():
+        onward = slice(before + 1, before + 2 + LONGEST)
+        back = np.flatnonzero(more[onward] == more[before])
+        if len(back):
+            stretch = slice(before + 1, before + 1 + int(back[0]))
+            if (np.diff(index[before : stretch.stop + 1]) == 0).any():
+                yield stretch
 
 
 def _as_well(plan: Plan, rows: Profiles, beat: Beat, index: Integers, moved: Integers, stretch: slice) -> bool:
-    """Return whether frames fit as well at the places ``moved`` once a flash that they see, or a frame, is left out."""
+    """Return whether frames fit as well at the places ``moved`` once flashes in a row that they see, or a frame, are
+    left out."""
     near = slice(max(stretch.start - MEMORY, 0), min(stretch.stop + MEMORY, len(index)))
     asked = slice(max(stretch.start - BESIDE, near.start), min(stretch.stop + BESIDE, near.stop))
     at = slice(asked.start - near.start, asked.stop - near.start)
@@ -62,14 +77,15 @@ def _as_well(plan: Plan, rows: Profiles, beat: Beat, index: Integers, moved: Int
     lit = np.flatnonzero(flashes.unknown)
     first_s, last_s = other.frame_start_s[at][[0, -1]]
     seen = lit[(flashes.start_s[lit] > first_s - rows.period_s) & (flashes.start_s[lit] < last_s + 2 * rows.period_s)]
-    tried = [_shown(other, beat, _dark(flashes, one), light) for one in seen.tolist()]
+    runs = [seen[n : n + count] for count in range(1, MOST_MISSING + 1) for n in range(len(seen) + 1 - count)]
+    tried = [_shown(other, beat, _dark(flashes, run), light) for run in runs]
     tried += [_black(_shown(other, beat, flashes, light), n) for n in range(at.start, at.stop)]
     return bool(min(_left(other, shown)[at].sum() for shown in tried) < left + NATURAL)
 
 
-def _dark(flashes: row_model.Flashes, one: int) -> row_model.Flashes:
+def _dark(flashes: row_model.Flashes, run: Integers) -> row_model.Flashes:
     unknown = flashes.unknown.copy()
-    unknown[one] = 0
+    unknown[run] = 0
     return flashes._replace(unknown=unknown)
 
 
