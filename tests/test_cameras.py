@@ -132,6 +132,39 @@ def test_whole_cycles_that_nothing_decides_are_listed_and_never_chosen(make_plan
         camera_clocks(takes, starts_s=[100.0, 100.0 + began_s + 0.45 * plan.cycle_s])
 
 
+@pytest.mark.parametrize("start_s", [12.4, 60.0, -60.0])
+def test_a_start_decides_by_the_cameras_seconds_and_not_by_the_strobes(make_plan: PlanMaker, start_s: float) -> None:
+    """The strobe runs slow by 3000 ppm: in 12 s it is late by one cycle."""
+    plan = make_plan()
+    slow = 1 / (1 + 3e-3) - 1
+    begin = int(start_s * (1 + slow) / plan.cycle_s * len(plan.cycle_slots)) + 3
+    later = replace(AT_FIRST, clip="B", rate_ppm=1e6 * slow, offset_s=start_s * (1 + slow))
+    last = abs(begin) + 100
+    takes = [
+        seen(plan, replace(AT_FIRST, rate_ppm=1e6 * slow), begin=0, count=last if begin > 0 else 100),
+        seen(plan, later, begin=begin, count=100 if begin > 0 else last),
+    ]
+    found = camera_clocks(takes, starts_s=[5.0, 5.0 + start_s]).cameras[1]
+    assert found.first_flash == begin
+    assert found.offset_s == pytest.approx(start_s, abs=1e-6)
+    nearer = camera_clocks(takes, starts_s=[5.0, 5.0 + start_s + 0.2 * plan.cycle_s]).cameras[1]
+    assert nearer.first_flash == begin
+
+
+def test_starts_that_are_listed_are_in_the_cameras_seconds(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    slow = replace(AT_FIRST, rate_ppm=-3000.0)
+    takes = [seen(plan, slow, begin=0, count=1400), seen(plan, replace(slow, clip="B"), begin=1200, count=1400)]
+    with pytest.raises(PsvideoError, match="may have begun") as refusal:
+        camera_clocks(takes)
+    said = re.findall(r"may have begun (.*), \.\.\. s after", str(refusal.value))[0]
+    cycle_s = float(np.diff(takes[0].timing.start_s[[0, len(plan.cycle_slots)]])[0])
+    assert np.diff([float(one) for one in said.split(", ")]) == pytest.approx(cycle_s, abs=0.0011)
+    earliest = -1400 + next(n for n in range(1, 12) if (n - 1400 - 1200) % len(plan.cycle_slots) == 0)
+    began_s = _on_camera(slow, float(plan.train(earliest, 1).start_s[0])) - takes[1].timing.flashes[0].start_s
+    assert float(said.split(", ")[0]) == pytest.approx(began_s, abs=0.0006)
+
+
 @pytest.mark.parametrize("dark_code", [None, 7])
 def test_clips_that_are_said_not_to_have_run_at_the_same_time_share_nothing(
     make_plan: PlanMaker, dark_code: int | None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.arrays import Doubles
 from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 from psvideo.model.marker import cycle_places
 from psvideo.model.plan import Plan
@@ -73,7 +74,17 @@ def _slots(timing: Timing) -> list[int]:
 
 
 def _possible(first: CameraTake, take: CameraTake) -> list[int]:
-    """Return the numbers that a clip's flash 0 may have among the first clip's, where they share any flash."""
+    """Return the numbers that a clip's flash 0 may have among the first clip's, where they share any flash.
+
+    A cycle of two lights and a dark slot, of which the first clip saw 7 flashes and the other one 5. Its places in the
+    cycle, 1 against 2, leave every third number, and of these only -2, 1 and 4 let both share any::
+
+        first clip, 0 to 6:                b . a b . a b
+        the other, its 0 at -5:  . a b . a                      shares none
+                         at -2:        . a b . a                shares 3: b . a
+                         at  1:              . a b . a          shares all 5
+                         at  4:                    . a b . a    shares 3: . a b
+    """
     cycle = len(first.plan.cycle_slots)
     counts = len(first.timing.flashes), len(take.timing.flashes)
     ours, theirs = (cycle_places(each.plan, _slots(each.timing)) for each in (first, take))
@@ -86,7 +97,7 @@ def _possible(first: CameraTake, take: CameraTake) -> list[int]:
 def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted_s: float | None) -> int:
     names = f"{take.timing.clip} and {first.timing.clip}"
     if len(possible) > 1 and wanted_s is None:
-        choices = ", ".join(f"{_began_s(first, take, number):+.3f}" for number in possible[:6])
+        choices = ", ".join(f"{began_s:+.3f}" for began_s in _began_s(first, take, possible[:6]))
         more = ", ..." if len(possible) > 6 else ""
         raise PsvideoError(
             f"{names}: the strobe repeats itself every {first.plan.cycle_s:.4g} s, so which flashes they share is not "
@@ -114,8 +125,9 @@ def _nearest(first: CameraTake, take: CameraTake, possible: Sequence[int], wante
     nothing; or where the start lies between two.
     """
     cycle_s = first.plan.cycle_s
-    number = min(possible, key=lambda one: abs(_began_s(first, take, one) - wanted_s))
-    nearest_s = _began_s(first, take, number)
+    began_s = _began_s(first, take, possible)
+    nearest = int(np.abs(began_s - wanted_s).argmin())
+    number, nearest_s = possible[nearest], float(began_s[nearest])
     said = f"`starts_s`: {take.timing.clip} is said to begin {wanted_s:+.3f} s after {first.timing.clip}"
     if abs(nearest_s - wanted_s) > HALF * cycle_s:
         raise UsageError(
@@ -131,12 +143,20 @@ def _nearest(first: CameraTake, take: CameraTake, possible: Sequence[int], wante
     return number
 
 
-def _began_s(first: CameraTake, take: CameraTake, number: int) -> float:
-    """Return how long after the first clip another began, were its flash 0 that flash of the first clip's."""
-    cycle = first.plan.train(cycle_places(first.plan, _slots(first.timing))[0], 1)
+def _began_s(first: CameraTake, take: CameraTake, numbers: Sequence[int]) -> Doubles:
+    """Return how long after the first clip another began, were its flash 0 the first clip's flash of each of some
+    possible ``numbers``: (number,), in seconds of the first camera.
+
+    A flash that the first clip saw is where it was found. Those before it follow from the strobe's rate on that clock:
+    100 ppm are 30 ms in five minutes, most of a cycle.
+    """
+    found_s, before = first.timing.start_s, max(0, -min(numbers))
     place = cycle_places(first.plan, _slots(first.timing))[0]
-    strobe_s = float(first.plan.train(place + number, 1).start_s[0] - cycle.start_s[0])
-    return first.timing.flashes[0].start_s + strobe_s - take.timing.flashes[0].start_s
+    strobe_s = first.plan.train(place - before, before + len(found_s)).start_s
+    rate = np.polyfit(strobe_s[before:] - strobe_s[before], found_s, 1)[0] if len(found_s) > 1 else 1.0
+    early_s = found_s[0] + rate * (strobe_s[:before] - strobe_s[before])
+    began_s: Doubles = np.concatenate([early_s, found_s])[before + np.asarray(numbers)] - take.timing.flashes[0].start_s
+    return began_s
 
 
 def _overlap(first: CameraTake, take: CameraTake, number: int) -> tuple[int, int]:
