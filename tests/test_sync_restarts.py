@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.errors import NoStrobeError
+from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Timing
@@ -252,6 +252,21 @@ def test_only_frames_that_the_strobe_lights_have_flashes(kind: str, first: bool,
     begin, end = (0, count - 1) if first else (72, 71 + count)
     assert any(f"No strobe like the plan's is found in frames {begin} to {end}" in note for note in timing.notes)
     assert not any("started again" in note for note in timing.notes)
+
+
+def test_the_first_light_is_that_of_the_first_part_that_is_found(make_plan: PlanMaker, plan: Plan) -> None:
+    lit_at_first = other_picture("bright", 40)
+    unmarked = make_plan(height_px=48, width_px=12, dark=False)
+    profiles = np.concatenate([lit_at_first, shot_of(unmarked, frames=72).frames.mean(axis=2, dtype=np.float64)])
+    named = timing_from_rows(unmarked, np.arange(112), profiles, first_light="left")
+    first = next(flash for flash in named.flashes if flash.complete)
+    assert (named.order, first.lit) == ("given", ("left",))
+
+    shot = shot_of(plan, frames=72)
+    profiles = np.concatenate([lit_at_first, shot.frames.mean(axis=2, dtype=np.float64)])
+    [third] = [flash for flash in shot.flashes if flash.lit and flash.start_s > 0][2].lit
+    with pytest.raises(PsvideoError, match=f"`first_light` {third} does not fit the footage: by the cycle's marker"):
+        timing_from_rows(plan, np.arange(112), profiles, first_light=third)
 
 
 @pytest.mark.parametrize("count", [30, 100])

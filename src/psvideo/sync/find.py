@@ -128,8 +128,11 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
 
 
 def _named_strobes(plan: Plan, parts: Sequence[tuple[slice, ClipFit]], first_light: str | None) -> list["FoundStrobe"]:
-    """Return the strobes of a clip's parts, the same light under the same name in all of them."""
-    strobes = [_strobe(plan, found, first_light if cut.start == 0 else None) for cut, found in parts]
+    """Return the strobes of a clip's parts, the same light under the same name in all of them.
+
+    ``first_light`` is the first part's, wherever that begins: the clip's first complete flash lies in it.
+    """
+    strobes = [_strobe(plan, found, None if n else first_light) for n, (_, found) in enumerate(parts)]
     named = named_alike(plan, [(one.found, one.order) for one in strobes])
     return [FoundStrobe(found=found, order=order) for found, order in named]
 
