@@ -171,6 +171,21 @@ def test_a_synced_clip_begins_with_the_light_that_is_named(
     assert ["+".join(flash.lit) or "-" for flash in timing.flashes] == order.split(), names
 
 
+def test_of_a_synced_clip_only_frames_that_are_used_have_flashes(make_plan: PlanMaker) -> None:
+    """Frames 4 to 11 without 6 and 7, as ``frames`` picks them: names, times and holes are those of these frames."""
+    plan = make_plan(mode="synced", readout=0.0, dark=False)
+    used = np.array([4, 5, 8, 9, 10, 11])
+    timing = timing_from_rows(plan, used, np.zeros((6, 2)))
+    period_s = plan.camera.frame_period_s
+    assert [int(flash.start_s // period_s) for flash in timing.flashes] == list(range(4, 12))
+    assert [flash.index for flash in timing.flashes] == list(range(8))
+    assert [int(flash.start_s // period_s) for flash in timing.flashes if flash.complete] == used.tolist()
+    assert [flash.slot for flash in timing.flashes] == [n % 3 for n in range(4, 12)]
+    named = timing_from_rows(plan, used, np.zeros((6, 2)), first_light="right")
+    assert [flash.lit[0] for flash in named.flashes[:3]] == ["right", "key", "left"]
+    assert named.flashes[0].start_s == timing.flashes[0].start_s
+
+
 def test_lights_that_flash_together_are_named_together(make_plan: PlanMaker) -> None:
     plan = make_plan(mode="synced", readout=0.0, dark=False)
     pair = replace(plan.flashes[1], lights={"left": 1.0, "right": 0.5})

@@ -120,20 +120,22 @@ def synced_timing(
 ) -> Timing:
     """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter.
 
-    Frame 0 holds the plan's first flash, or, where a ``first_light`` of the plan is named, the nearest after it from
-    which that one is the first to be lit.
+    Place 0 in time holds the plan's first flash, or, where a ``first_light`` of the plan is named, the first frame that
+    is looked at holds the nearest after it from which that one is the first to be lit. ``indices`` (frame,) are these
+    frames' places in time, ascending; a flash between them whose frame is not there is incomplete.
     """
     period_s, exposure_s = plan.camera.frame_period_s, plan.camera.exposure_s
-    turn = 0 if first_light is None else _turn_to(plan, first_light)
-    train = plan.train(turn, int(indices[-1]) + 1)
+    first, last = int(indices[0]), int(indices[-1])
+    train = plan.train(first if first_light is None else _turn_to(plan, first_light), last + 1 - first)
+    there = np.isin(np.arange(first, last + 1), indices)
     flashes = tuple(
         Flash(
             index=n,
             slot=int(slot),
             lights=plan.flashes[slot].lights,
-            start_s=n * period_s + WITHIN * exposure_s,
+            start_s=(first + n) * period_s + WITHIN * exposure_s,
             duration_s=min(float(duration_s), (1 - 2 * WITHIN) * exposure_s),
-            complete=True,
+            complete=bool(there[n]),
         )
         for n, (slot, duration_s) in enumerate(zip(train.slot, train.duration_s, strict=True))
     )
