@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.model.plan import Plan
-from psvideo.model.rows.shutter import frames_touched
+from psvideo.model.rows.shutter import frames_touched, row_weights
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
 from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
@@ -129,6 +129,19 @@ def test_a_dead_light_has_no_flash_below_360_degrees_either(share: float, make_p
     fired = [one for one in inside(plan, shot) if one.slot == slot and one.start_s < from_s]
     named = [one for one in timing.flashes if one.complete and name in one.lights]
     assert len(named) >= len(fired) - 2
+
+
+def test_below_360_degrees_a_flash_that_few_rows_see_is_missing_if_these_are_dark(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=48, width_px=12, shutter=0.5, readout=0.65)
+    whole = inside(plan, shot_of(plan, lambda _: False))
+    start_s, lasts_s = (np.array([getattr(one, name) for one in whole]) for name in ("start_s", "duration_s"))
+    squared = (row_weights(plan.camera, start_s, lasts_s, frames=range(FRAMES)).sum(axis=1) ** 2).mean(axis=1)
+    few = next(one.index for one, share in zip(whole, squared, strict=True) if 0.1 < share < 0.19)
+    shot = shot_of(plan, lambda flash: flash.index == few)
+    timing = timing_of(plan, shot)
+    assert held_against(plan, shot, timing) == [flash.index != few for flash in whole]
+    assert len(timing.notes) == 1
+    assert "1 flash never fired" in timing.notes[0]
 
 
 def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(plan: Plan) -> None:

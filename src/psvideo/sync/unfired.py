@@ -35,10 +35,12 @@ AROUND = 3
 """Lit flashes before and after, or a round of them, that show whether light goes on;"""
 GOES_ON = 0.5
 """it does where one on either side gives this share of its own light."""
-SEEN = 0.2
-"""Rows must have seen this much of a flash, as a share of its squared light, to show whether it fired."""
+SEEN = 0.02
+"""Rows that have seen less than this of a flash, as a share of its squared light, do not show whether it fired, however
+little noise there is: what the times' errors do to so few rows is not in it."""
 SURE = 4.0
-"""Standard errors by which a gain, and usual scatters by which a flash, must lie below what one that fired shows."""
+"""Standard errors by which a gain, and usual scatters by which a flash, must lie below what one that fired shows. With
+so many a gain must be known to ``GOES_ON`` at all."""
 FAINT = 0.01
 """A light that gives less than this share of the brightest one is said to give none at all, elsewhere."""
 LEAST_FIRED = 3
@@ -221,7 +223,7 @@ class _Part:
         size = np.sqrt((light[:, 1:] ** 2).mean(axis=0))[self.unknown]
         whole = (light[:, 1:] ** 2).sum(axis=0)[self.unknown]
         noise = np.sqrt((own**2 * row_noise(rest) ** 2).sum(axis=(1, 2))) / np.maximum(power, 1e-30)
-        level: Doubles = np.where(power > SEEN * whole, gain * size, np.nan)
+        level: Doubles = np.where((power > SEEN * whole) & (SURE * noise < GOES_ON), gain * size, np.nan)
         return level, noise * size
 
     def _design(self, gain: Doubles, lights: int) -> Doubles:
