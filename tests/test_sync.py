@@ -12,12 +12,13 @@ from memory_frame import MemoryFrame
 from picture_file import read_picture
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.plan_toml import read_plan
+from psvideo.formats.plan_toml import format_plan, read_plan
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
+from psvideo.runs.sync import sync
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_until
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
@@ -186,6 +187,17 @@ def test_of_a_synced_clip_only_frames_that_are_used_have_flashes(make_plan: Plan
     assert named.flashes[0].start_s == timing.flashes[0].start_s
 
 
+def test_of_a_synced_clip_there_is_no_picture_to_draw(make_plan: PlanMaker, tmp_path: Path) -> None:
+    plan = make_plan(mode="synced", readout=0.0, height_px=8, width_px=8)
+    for number in range(4):
+        cv2.imwrite(str(tmp_path / f"shot.{number:04d}.png"), np.full((8, 8, 3), 9000, np.uint16))
+    (tmp_path / "plan.toml").write_text(format_plan(plan))
+    with pytest.raises(UsageError, match="`picture`: there is nothing to draw of"):
+        sync(tmp_path, out=tmp_path / "timing.json", picture=tmp_path / "found.png")
+    assert not (tmp_path / "timing.json").exists()
+    assert len(sync(tmp_path, out=tmp_path / "timing.json").flashes) == 4
+
+
 def test_lights_that_flash_together_are_named_together(make_plan: PlanMaker) -> None:
     plan = make_plan(mode="synced", readout=0.0, dark=False)
     pair = replace(plan.flashes[1], lights={"left": 1.0, "right": 0.5})
@@ -240,6 +252,12 @@ def test_footage_that_is_not_strobed_is_not_timed(make_plan: PlanMaker) -> None:
     steady = 0.3 + 0.2 * rng.random(plan.camera.height_px) + 0.01 * rng.standard_normal((60, plan.camera.height_px))
     with pytest.raises(PsvideoError, match="no strobe like the plan's was found"):
         timing_from_rows(plan, np.arange(60), steady)
+
+
+def test_pictures_of_one_row_are_not_timed(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=1)
+    with pytest.raises(PsvideoError, match=r"1 row high.*expected 2 rows at least"):
+        timing_from_rows(plan, np.arange(60), np.random.default_rng(1).random((60, 1)))
 
 
 def test_another_plans_footage_is_not_timed(make_plan: PlanMaker) -> None:

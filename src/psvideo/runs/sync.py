@@ -6,6 +6,7 @@ import numpy as np
 
 from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
@@ -55,7 +56,7 @@ def sync(
     Raises
     ------
     UsageError
-        Where an output exists or is no PNG.
+        Where an output exists or is no PNG, or there is nothing to draw.
     PsvideoError
         Where no strobe is found (NoStrobeError), or files cannot be used.
 
@@ -74,11 +75,16 @@ def sync(
         check_ending(picture_path, ".png", name="picture")
         refuse_existing(picture_path, force=force, mark=PICTURE_MARK)
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
+    if picture_path is not None and take.plan.mode == "synced":
+        raise UsageError(
+            f"`picture`: there is nothing to draw of {take.clip.name}: by its plan every frame holds one whole flash "
+            '(mode = "synced"), and no times are searched in the picture. Leave the option out.'
+        )
     say_of_clip(take.clip, caller)
     known = None if rig is None else read_rig(rig_of_take(rig, take.clip.path), plan_lights=take.plan.lights)
     profiles = take_profiles(take, watch=watch)
     timing = timing_of_profiles(take, profiles, first_light=first_light)
-    if picture_path is not None and take.plan.mode != "synced":
+    if picture_path is not None:
         _draw(picture_path, take, timing, profiles)
     timing = said_timing(timing if known is None else named_by_rig(take, timing, known), caller)
     if timing_path is not None:

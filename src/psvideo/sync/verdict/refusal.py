@@ -30,6 +30,8 @@ MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
 """No two clocks are further apart than this, errors of short clips included."""
 LITTLE_MORE = 2.0
 """Times the robust loss that more lights leave, which fewer may."""
+LEAST_ROWS = 2
+"""Rows of which the time from one to the next can be asked for at all."""
 PERIOD_FRAMES, PERIOD_ROWS = 14, 8
 LEAST_GAP, LONGEST = 0.25, 2.5
 """Periods are tried from this share of a frame's period after a flash to this many of them."""
@@ -37,12 +39,19 @@ MOST_PERIODS = LONGEST - LEAST_GAP
 
 
 def nothing_to_find(plan: Plan, rows: Profiles) -> str:
-    """Return why no search is worth while, or nothing where one is: too few frames, no change at all, or mere noise."""
+    """Return why no search is worth while, or nothing where one is: too few frames or rows, no change at all, or mere
+    noise."""
     least = least_frames(plan)
     if len(rows.value) < least:
         return (
             f"holds {counted(len(rows.value), 'frame')}; finding the timing of a strobe with "
             f"{counted(len(plan.lit_slots), 'lit flash')} a round needs at least {least}, and 50 or more make it sure."
+        )
+    if rows.value.shape[1] < LEAST_ROWS:
+        return (
+            f"its pictures are {counted(rows.value.shape[1], 'row')} high, and when flashes fired shows in how their "
+            f"light moves from row to row: expected {LEAST_ROWS} rows at least, as the camera reads them, and 100 or "
+            "more for times that are worth it. Give the clip at the height at which it was filmed."
         )
     shortest_s = plan.shortest_flash_s
     if shortest_s > plan.camera.frame_period_s:
