@@ -77,7 +77,7 @@ def sync_cameras(
         timing = find_timing(take, watch=watch)
         for note in timing.notes:
             caller.warn(f"{take.clip.name}: {note}")
-        takes.append(CameraTake(plan=take.plan, timing=timing))
+        takes.append(CameraTake(plan=take.plan, timing=timing, numbers=tuple(take.clip.numbers)))
     clocks = camera_clocks(takes, starts_s=starts_s)
     for note in (*clocks.notes, *_named_alike([path_of("clips", clip) for clip in clips], clocks)):
         caller.warn(note)

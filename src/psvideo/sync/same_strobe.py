@@ -11,7 +11,8 @@ from dataclasses import replace
 from psvideo.errors import PsvideoError
 from psvideo.model.marker import cycle_places, first_break
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.timing import Timing
+from psvideo.model.rows.shutter import frames_touched
+from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.model.units import counted
 from psvideo.strobe.bursts import POWER_TOLERANCE
 from psvideo.strobe.link.boards import BOARDS
@@ -32,8 +33,11 @@ def refuse_other_strobe(first: tuple[Plan, Timing], other: tuple[Plan, Timing]) 
         )
 
 
-def refuse_unnumbered(plan: Plan, timing: Timing) -> None:
-    """Raise PsvideoError where the numbers of a clip's flashes are a guess, or do not follow one another."""
+def refuse_unnumbered(plan: Plan, timing: Timing, numbers: Sequence[int] | None = None) -> None:
+    """Raise PsvideoError where the numbers of a clip's flashes are a guess, or do not follow one another.
+
+    ``numbers`` are those of all the clip's frames, ascending, by which it says where; left out, their places in time.
+    """
     if timing.order == "guess":
         raise PsvideoError(
             f"{timing.clip}: which flash is which is a guess, as the plan has no marker, so nothing says which flashes "
@@ -43,13 +47,28 @@ def refuse_unnumbered(plan: Plan, timing: Timing) -> None:
     last = first_break(plan, slots)
     if last is not None:
         first = min(last, bisect_left(range(len(slots)), 1, key=lambda n: len(cycle_places(plan, slots[n:])) > 0))
-        frames = [max(0, int(timing.flashes[n].start_s // timing.frame_period_s)) for n in (first - 1, last)]
+        before, after = _frames_around(plan, timing, first - 1, last, numbers)
         raise PsvideoError(
-            f"{timing.clip}: its strobe started again, or skipped flashes, between frames {frames[0]} and {frames[1]}: "
+            f"{timing.clip}: its strobe started again, or skipped flashes, between frames {before} and {after}: "
             "the flashes do not follow one another there as in the strobe's cycle, so which ones two cameras share "
             "is not known across it. Put the frames before, or those after, into a folder of their own with the plan "
             "beside them, and name that folder."
         )
+
+
+def _frames_around(
+    plan: Plan, timing: Timing, before: int, after: int, numbers: Sequence[int] | None
+) -> tuple[int, int]:
+    """Return the numbers of the last frame that saw a flash ``before`` a break, and of the first that saw one
+    ``after`` it; flashes beside the break that are not complete may not have fired."""
+    whole = [flash.index for flash in timing.flashes if flash.complete]
+    before = max((n for n in whole if n <= before), default=before)
+    after = min((n for n in whole if n >= after), default=after)
+    first, last = frames_touched(timed_camera(plan, timing), timing.start_s, timing.duration_s)
+    seen = {n: n for n in range(int(last.max()) + 1)} if numbers is None else places_in_time(timing, numbers)
+    early = [number for number, place in seen.items() if place <= last[before]]
+    late = [number for number, place in seen.items() if place >= first[after]]
+    return max(early, default=min(seen)), min(late, default=max(seen))
 
 
 def _first_difference(one: Plan, other: Plan) -> str:

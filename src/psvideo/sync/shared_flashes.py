@@ -33,10 +33,14 @@ the second it is nearer to another one, even where the clips share flashes in th
 
 @dataclass(frozen=True, kw_only=True)
 class CameraTake:
-    """What one camera saw: its plan, and the timing that was found in its clip."""
+    """What one camera saw: its plan, and the timing that was found in its clip.
+
+    ``numbers`` are those of all its frames, ascending, by which errors name them; None: their places in time.
+    """
 
     plan: Plan
     timing: Timing
+    numbers: tuple[int, ...] | None = None
 
 
 def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | None = None) -> CameraClocks:
@@ -49,7 +53,7 @@ def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | No
     first = takes[0]
     for take in takes:
         refuse_other_strobe((first.plan, first.timing), (take.plan, take.timing))
-        refuse_unnumbered(take.plan, take.timing)
+        refuse_unnumbered(take.plan, take.timing, take.numbers)
     cycle_s = first.plan.cycle_s
     cameras, decided, notes = [], True, []
     for k, take in enumerate(takes):
