@@ -177,6 +177,15 @@ def test_thirty_frames_that_are_missing_are_one_hole(plan: Plan) -> None:
     assert sum("as if 30 frames were missing" in note and "may look the same" in note for note in timing.notes) == 1
 
 
+def test_where_the_strobe_seems_to_start_again_missing_frames_are_named_too(plan: Plan) -> None:
+    keep = np.delete(np.arange(170), np.arange(60, 110))
+    profiles = shot_of(plan, frames=170).frames.mean(axis=2, dtype=np.float64)[keep]
+    timing = timing_from_rows(plan, np.arange(len(keep)), profiles)
+    assert timing.dropped_frames == ()
+    [note] = [note for note in timing.notes if "strobe started again" in note]
+    assert "Many frames that are missing there" in note
+
+
 def test_frames_that_are_missing_are_no_restart(plan: Plan) -> None:
     keep = np.delete(np.arange(FRAMES), [31, 62, 63, 64])
     profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)[keep]

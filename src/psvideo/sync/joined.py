@@ -91,13 +91,16 @@ def joined(
 
 
 def _restarts(chapters: Sequence[Chapter]) -> Iterator[str]:
-    """Say where the strobe started again."""
+    """Say where the strobe started again, or so many frames are missing that it looks the same (``remarks_on_frames``
+    says that of holes that are found)."""
     if len(chapters) > 1:
         spans = ", ".join(f"{one.first} to {one.last}" for one in chapters)
         yield (
             "The strobe started again during the clip, at another place in its cycle, as after a restart or a missed "
             f"flash. Each part has a timing of its own: frames {spans}. Flashes beside the breaks, and frames outside "
-            "of these parts, are left out."
+            "of these parts, are left out. Many frames that are missing there, though the numbers do not show it, may "
+            "look the same: then the same flashes lie in the same frames, but all parts behind come as much later than "
+            "the times given."
         )
 
 
