@@ -107,8 +107,21 @@ class _Take:
 
 
 def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, ClipFit]]:
-    """Return the parts of a clip in which the strobe is found, nothing where the clip is one. A part beside the dark is
-    believed alone only where the whole clip is not, or fits some of it worse."""
+    """Return the parts of a clip in which the strobe is found, nothing where the clip is one (or nothing is found).
+
+    Six ways out, the first that holds; the first five with a fit of the whole clip that is believed:
+
+    1. It fits everywhere, and no frames are missing (``may_restart``): one clip.
+    2. It fits by missing frames, but the strobe moved by what they do not explain (``moved_at_breaks``): the parts
+       between those breaks.
+    3. Missing frames part a frame or two at an end from the others, as where the strobe stopped within a frame: the
+       parts that are found among the others.
+    4. No parts are found by themselves, but for one beside the dark, and the whole fits no frames worse than others:
+       one clip.
+    5. Parts are found, and the whole's strobe is that of each (``unbroken``): one clip.
+    6. Else the parts that were found, or the one beside the dark; none where there are none, and then it is the whole
+       fit that is believed or refused.
+    """
     whole, believed = verdict.found, verdict.believed
     if believed and not may_restart(plan, rows, whole):
         return []

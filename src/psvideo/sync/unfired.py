@@ -75,6 +75,18 @@ def unfired_of(
     A flash of which too little was seen, as below 360 degrees most that fall between two exposures, is one where those
     of its light before and after are, and may be one where one of them is. ``breaks``: whether the strobe began at the
     first frame, or stopped at the last, which flashes beyond all that were seen well may not have seen.
+
+    One light's flashes, with those of others between them, under ``breaks`` (True, False). What they give is 1, 0 or
+    not known; ``told`` are those of which it is::
+
+        gives     ?   ?   1   ?   1   ?   0   ?   0   ?   1   ?
+        told      .   .   x   .   x   .   x   .   x   .   x   .
+        never                             x   x   x
+        beside    b   b               x               x
+
+    Between two that fired one has fired, between two dead ones it never did, and between one of each it may have. The
+    first two (b) have none before them, and the strobe began in their time; the last is taken to be as the one before
+    it, as the strobe did not stop.
     """
     lit = [flash for flash in flashes if not flash.is_dark]
     if not lit:

@@ -71,7 +71,14 @@ class Profiles:
     def windowed(self, frames_each: int) -> "Profiles":
         """Return the same profiles in windows of about this many frames.
 
-        Where more are missing, a window ends, and the frame before is one by itself: the clock may bend there.
+        Where more are missing, a window ends, and the frame before is one by itself: the clock may bend there. Of 50
+        frames in windows of 25, with 40 missing behind the 31st::
+
+            place in time   0 ... 24 | 25 ... 29 | 30 | 71 ... 89
+            window               0         1        2       3
+
+        The clock runs straight within a window, from its first frame to the next one's. Window 2 takes up the whole
+        gap, so that windows 1 and 3 are held only by frames that lie close together.
         """
         count = max(len(self.value) // max(frames_each, 1), 1)
         starts = np.linspace(0, len(self.value), count, endpoint=False).astype(np.int64)
