@@ -288,7 +288,7 @@ def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(
     assert inside["supplied"] < -1.0, "the supplied circle lies inside the dark ball"
 
 
-@pytest.mark.parametrize("wrong", [(0, 44, 0), (0, 0, -40), (130, 130, -130)])
+@pytest.mark.parametrize("wrong", [(0, 44, 0), (0, 0, -40)])
 def test_a_circle_that_the_picture_contradicts_is_named_and_costs_its_error(
     psbox: Path, tmp_path: Path, wrong: tuple[float, float, float]
 ) -> None:
@@ -301,6 +301,15 @@ def test_a_circle_that_the_picture_contradicts_is_named_and_costs_its_error(
     assert any(f"the `circle` {x:.0f},{y:.0f},{radius:.0f} lies" in one for one in said)
     assert errors.mean() > 1.5
     assert (errors < 2.5 * own).all()
+
+
+def test_a_circle_within_the_ball_is_named_and_gives_no_rig(psbox: Path, tmp_path: Path) -> None:
+    """Its claims were of 90 degrees and more."""
+    x, y, radius = PSBOX_CIRCLE
+    out = tmp_path / "rig.toml"
+    with pytest.raises(PsvideoError, match=r"the `circle` 666,608,291 lies 183 pixels from the outline that the pict"):
+        mirror_sphere([psbox], out=out, circle=[(x + 130, y + 130, radius - 130)])
+    assert not out.exists()
 
 
 def _errors_of_named(psbox: Path, found: MirrorCalibration) -> tuple[np.ndarray, np.ndarray]:
@@ -339,6 +348,18 @@ def test_a_ball_beside_the_circle_is_named_unless_it_has_a_circle_of_its_own() -
     assert "no round outline shows at the `circle` 399,130,59, but one at 142,130,90" in alone[0].doubt
     both = sight_spheres([pictures], Looking(focal_px=900.0, circles=(lost, seen)), where="ball")
     assert [one.doubt for one in both] == ["", ""]
+
+
+@pytest.mark.parametrize("circle", [(161.0, 130.0, 90.0), (221.0, 130.0, 90.0), (141.0, 130.0, 30.0)])
+def test_a_circle_that_is_far_off_the_ball_gives_no_rig(circle: tuple[float, float, float]) -> None:
+    """Lights were 25 to 150 degrees off, and the rig claimed up to 500 degrees."""
+    lens = Lens(width=500, height=260, focal=900.0)
+    pictures = shoot(lens, [Ball(centre=(-0.06, 0.0, -0.5))], DISTANT)
+    looking = Looking(focal_px=900.0, circles=(circle,))
+    with pytest.raises(
+        PsvideoError, match=r"no light could be measured on the sphere \(the `circle` .* lies .* pixels"
+    ):
+        calibrate_lights(sight_spheres([pictures], looking, where="ball"))
 
 
 def test_the_chrome_sphere_of_washington(shared_data: Path, tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ from psvideo.model.arrays import Doubles
 
 DISAGREE_DEG = 10.0
 """Directions from two spheres that differ by more, and do not meet in a point, cannot both be right."""
+MOST_ERROR_DEG = 20.0
+"""A light whose direction is less known is left out: another one of the rig may stand there."""
 MOST_POSITION_ERROR = 0.15
 """Share of its distance by which a near light's position may be uncertain; beyond, it gets a direction only."""
 
@@ -34,9 +36,10 @@ def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = 
     lights = tuple(_measured(name, sightings, known_m) for name in names)
     if all(light.fault for light in lights):
         reasons = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
+        told = next((f"{one.doubt.partition('. ')[0]}; " for one in sightings if one.doubt), "")
         raise PsvideoError(
-            f"{sightings[0].where}: no light could be measured on the sphere ({reasons}). Expected a small bright "
-            "highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. "
+            f"{sightings[0].where}: no light could be measured on the sphere ({told}{reasons}). Expected a small "
+            "bright highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. "
             "Look at where the sphere was taken to be, and mark it with `circle` where that was wrong."
         )
     doubts = doubts_of(lights, sightings, radius_m=radius_m)
@@ -64,7 +67,15 @@ def _measured(name: str, sightings: Sequence[Sighting], radius_m: float | None) 
         ray for sighting, one in seen if one.alike and (ray := _agreeing(sighting, one, rays, radius_m)) is not None
     ]
     can_cross = radius_m is not None and sightings[0].outline.view.focal_px is not None
-    return _joined(name, rays, can_cross=can_cross, lacking=lacking_for_positions(sightings))
+    found = _joined(name, rays, can_cross=can_cross, lacking=lacking_for_positions(sightings))
+    if found.error_deg > MOST_ERROR_DEG:
+        return MeasuredLight(name=name, rays=found.rays, fault=_unsure(found.error_deg))
+    return found
+
+
+def _unsure(error_deg: float) -> str:
+    known = f"known to {error_deg:.0f} degrees only" if error_deg < 90 else "not known"
+    return f"its direction is {known}: where the sphere is, is not sure, or the highlight lies at its very rim"
 
 
 def _ray(sighting: Sighting, place: Doubles, one: Highlight, radius_m: float | None) -> Ray | None:
