@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from psvideo.live.following.first_shown import first_shown
 from psvideo.live.following.foretold import shift_of
 from psvideo.live.following.lock import Lock
 from psvideo.live.following.phase_filter import Measured, PhaseFilter, started
@@ -43,6 +44,9 @@ HELD = 0.33
 ASTRAY, LEAST_ASTRAY_ROWS = 8.0, 0.1
 """A strobe that stands by more standard errors, and more rows, from where its clock has it is another one: one that was
 started again. Where frames are missing it stands within 2 errors, else hardly ever within 15."""
+NOTHING = 1e-3
+"""Frames that change by this share of what the strobe's light changes (ten stops less) show nothing of it, and what is
+fitted to them explains it all."""
 STEP_COST = 0.02
 """What every frame that is taken for missing costs, in mean losses of a frame: cycles may look alike."""
 
@@ -114,6 +118,11 @@ class Follower:
         """Forget which frames beyond a number are missing or repeated: another lock knows better."""
         self.holes[:] = [hole for hole in self.holes if hole.before <= number]
         self.repeated[:] = [again for again in self.repeated if again <= number]
+
+    def begin_at(self, place: int) -> None:
+        """Begin what is followed at a place in time, where it began before that."""
+        if self.span is not None:
+            self.span = max(self.span[0], place), self.span[1]
 
     def trimmed(self, at_s: float, ppm: float) -> None:
         """Foresee that the strobe, from a time on, comes later by this many ppm of the time that passes."""
@@ -225,7 +234,7 @@ class Follower:
         if self.state == "unsure" and self.window.since_change() < LATEST:
             return
         latest = rows.take(slice(len(rows.value) - LATEST, len(rows.value)))
-        self.share = gain_of(latest, rest[-LATEST:])
+        self.share = 0.0 if self._shows_nothing(latest) else gain_of(latest, rest[-LATEST:])
         left = LEFT if self.state == "locked" else LEFT_AFTER_CHANGE
         least = max(MIN_GAIN, left * self._usual_share)
         good = self.share > least and explained(latest, rest[-LATEST:]) > MIN_EXPLAINED
@@ -236,6 +245,12 @@ class Follower:
             self._doubt(int(latest.index[0]))
         else:
             self.state = "lost"
+
+    def _shows_nothing(self, rows: Profiles) -> bool:
+        """Return whether rows hardly change, against what they did when brightnesses were last learnt."""
+        if self._learnt is None:
+            return False
+        return float(rows.value.std(axis=0).max()) < NOTHING * float(self._learnt.spread.max())
 
     def _is_another(self) -> bool:
         """Return whether what is seen after a doubt is not the strobe from before it, as far as is known yet."""
@@ -285,18 +300,20 @@ def caught_up(
 
     ``numbers`` are the frames' own (left out: their places in time): where the lock has frames come later than these
     say, and later than those before, frames are missing, as where the follower finds it; a frame that has the place of
-    the one before repeats it.
+    the one before repeats it. What is followed begins at the first frame in which the strobe is seen.
     """
     follower, places = following(plan, lock), lock.places.tolist()
+    doubts = doubts or [None] * len(values)
     numbers = places if numbers is None else numbers
     later = follower.extra = places[0] - numbers[0]
-    for number, place, value, doubt in zip(numbers, places, values, doubts or [None] * len(values), strict=True):
+    for number, place, value, doubt in zip(numbers, places, values, doubts, strict=True):
         more, later = place - number - later, place - number
         follower.extra += more
         if more > 0:
             follower.holes.append(Hole(before=number, count=more))
         follower.repeated.extend([number] * -more)
         follower.add(number, value, doubt)
+    follower.begin_at(first_shown(plan, lock, values, doubts))
     return follower
 
 

@@ -19,7 +19,8 @@ KNOT_S = 0.2
 def timing_now(follower: Follower, span: tuple[int, int]) -> Timing:
     """Return the flashes that some frames saw, from the first to the last of ``span``, as the clock is known now."""
     beat = replace(follower.beat, clock=follower.clock)
-    flashes = flashes_seen(follower.plan, beat, follower.lock.camera, span, trusted=span)
+    known = (span[0] if follower.span is None else max(span[0], follower.span[0])), span[1]
+    flashes = flashes_seen(follower.plan, beat, follower.lock.camera, span, trusted=known)
     return _timing(follower, flashes, beat, clip="live")
 
 

@@ -33,7 +33,7 @@ class Lock:
 
     ``order`` is how the lights' names are known. ``error_s`` and ``error_ppm`` are the standard errors of phase and
     rate at the time ``at_s``, the first frame's. ``places`` (frame,) are the frames' true places in time: some may have
-    gone missing without a word.
+    gone missing without a word. ``trusted_from`` is the first place from which frames fit.
     """
 
     beat: Beat
@@ -43,6 +43,7 @@ class Lock:
     error_s: float
     error_ppm: float
     places: NDArray[np.int64]
+    trusted_from: int
 
 
 def check_followed(plan: Plan) -> None:
@@ -96,6 +97,7 @@ def lock(
         error_s=UNSURE * fit.shift_error_s,
         error_ppm=UNSURE * float(np.sqrt(12.0)) * fit.shift_error_s / span_s * 1e6,
         places=places + begin,
+        trusted_from=int(strobe.found.trusted[0]) + begin,
     )
 
 
