@@ -601,7 +601,7 @@ def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_
 ) -> None:
     clip = noiseless(lights, motion)
     comb = Comb(fps=Fraction(24), first_s=0.0, open_s=0.5 / 24)
-    due = Schedule(by_round={1002: tuple((1001, time_s) for time_s in comb.samples_s(0))}, left_out=(0, 0, 0))
+    due = Schedule(by_round={1002: tuple((1001, time_s) for time_s in comb.samples_s(0))}, left_out=(0, 0, 0), rounds=1)
     plates = (plate for one in clip.rounds for plate in one.plates)
     how = Aligning(rate=comb)
     (one,) = with_open_shutter(aligned(plates, clip.lights, how, first=1001, schedule=due))
@@ -631,7 +631,7 @@ def test_what_changes_as_no_motion_explains_is_blended_by_time_while_a_shutter_i
         seen = np.ones(len(image), np.bool_)
         plates.append(LightPlate(light=f"l{light}", number=number, time_s=at_s, picture=mixture_of(image), seen=seen))
     times_s = 3.5 * PITCH_S + PITCH_S / 3 * (np.arange(15) - 7) / 15
-    due = Schedule(by_round={1: tuple((1001, float(time_s)) for time_s in times_s)}, left_out=(0, 0, 0))
+    due = Schedule(by_round={1: tuple((1001, float(time_s)) for time_s in times_s)}, left_out=(0, 0, 0), rounds=1)
     how = Aligning(rate=Comb(fps=Fraction(24), first_s=float(times_s[7]), open_s=1.0))
     (one,) = with_open_shutter(aligned(plates, ("l0", "l1", "l2"), how, first=1001, schedule=due))
     for light, plate in enumerate(one.open_plates):

@@ -260,6 +260,14 @@ def test_a_part_of_the_frames_shows_the_same_instants_under_the_same_numbers(pas
         assert apart.mean() < 0.001, "but for what flows from other flashes at the cut"
 
 
+def test_a_rate_so_low_that_no_instant_is_near_a_round_is_refused_as_that(passing: Path, tmp_path: Path) -> None:
+    with pytest.raises(
+        UsageError,
+        match=r"no instant at this rate, the first at .*is near one of the clip's \d+ whole rounds\. Give a hi",
+    ):
+        ps.split(passing, out=tmp_path / "out", fps=0.001)
+
+
 def test_the_relit_movie_is_blurred_as_the_plates_are(make_plan: PlanMaker) -> None:
     """Of a matte surface that moves: what it shows under a further light is blurred as under that one it would be."""
     plan, fps = make_plan(lights=("a", "b", "c", "d"), dark=False), Fraction(24)

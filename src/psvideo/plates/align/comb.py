@@ -89,11 +89,12 @@ def comb_of(
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """The instants that are shown, (number, time in seconds), by round; and ``left_out``, how many of the comb before
-    the first, within holes, and after the last instant lack a round."""
+    """The instants that are shown, (number, time in seconds), by round; ``left_out``, how many of the comb before
+    the first, within holes, and after the last instant lack a round; and how many whole ``rounds`` there are."""
 
     by_round: Mapping[int, tuple[tuple[int, float], ...]]
     left_out: tuple[int, int, int]
+    rounds: int
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -122,7 +123,7 @@ def schedule_of(
     count = comb.count_until(end_s)
     shown = range(count) if comb.only is None else comb.only
     if not times_s:
-        return Schedule(by_round={}, left_out=(len(shown), 0, 0))
+        return Schedule(by_round={}, left_out=(len(shown), 0, 0), rounds=0)
     numbers = list(times_s)
     middles_s = np.array([np.mean(times) for times in times_s.values()])
     reach_s = REACH * plan.cycle_s / len(plan.dark_rounds)
@@ -141,4 +142,5 @@ def schedule_of(
     return Schedule(
         by_round={number: tuple(instants) for number, instants in by_round.items()},
         left_out=(left_out[0], left_out[1], left_out[2]),
+        rounds=len(times_s),
     )

@@ -56,9 +56,17 @@ def metric_delivery(delivery: Delivery, aov: Sequence[Aov], lighting: Lighting, 
 
 
 def say_instants(take: Take, timing: Timing, aligning: Aligning | None, output: Output) -> Schedule | None:
-    """Say which instants are delivered at a steady rate, and which are not; return them, None where rounds decide."""
+    """Say which instants are delivered at a steady rate, and which are not; return them, None where rounds decide.
+
+    Raises UsageError where a rate has no instant near a whole round, though there are rounds.
+    """
     due = None if aligning is None else scheduled(take, timing, aligning, start_number=output.start_number)
     if due is not None and aligning is not None and isinstance(aligning.rate, Comb):
+        if due.rounds and not due.numbers:
+            raise UsageError(
+                f"`fps` {aligning.rate.fps}: no instant at this rate, the first at {aligning.rate.first_s:.4g} s, is "
+                f"near one of the clip's {counted(due.rounds, 'whole round')}. Give a higher rate."
+            )
         output.caller.say(_instants_said(aligning.rate, due, output.start_number))
     return due
 
@@ -79,8 +87,8 @@ def _instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
     clock = "the camera's clock" if comb.clock is None else "the clock of the cameras' reference"
     rest = f" Left out, as no whole round is near: {', '.join(lacking)}." if lacking else " None is left out."
     return (
-        f"Instants at {show_rate(comb.fps)}: number {start_number} + k shows {comb.first_s:.7g} s + k / {comb.fps} on "
-        f"{clock}. {shown}.{rest}"
+        f"Instants at {show_rate(comb.fps)}: number {start_number} + k shows {comb.first_s:.7g} s + k / ({comb.fps}) "
+        f"on {clock}. {shown}.{rest}"
     )
 
 
