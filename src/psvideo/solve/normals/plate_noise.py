@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.compute.ranks import median, quantile, rising_parts
+from psvideo.compute.ranks import median, rising_parts
 from psvideo.model.arrays import Doubles
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.noise_samples import Differences, noise_samples
 from psvideo.solve.normals.task import Samples
 
 LEAST = 0.0003
@@ -17,18 +17,16 @@ LEAST = 0.0003
 WELL_LIT = 0.25
 """LEAST is that of a picture whose brightest parts reach this. A darker one is as much less noisy at least: twelve bits
 that lie low in files of sixteen never come near what their files can hold, and are as good as elsewhere."""
-ROWS, SAMPLES = 24, 1 << 16
-"""Noise is looked for in about this many rows of every plate, evenly spread, and this many samples of all: of small
-pictures in more rows."""
+SAMPLES = 1 << 16
+"""Noise is looked for at about this many samples of all plates."""
 LEVELS, LEAST_PIXELS, BRIGHT = 12, 512, 0.25
 """What is brighter than this share of the brightest level shows how noise grows with light."""
-CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST = 1 << 12, 5, 1.25, 0.025
-"""This many samples of a plate show whether it holds a file's codes: it then has few values, but at least LEAST_CODES,
-which most samples share, and half of the gaps between neighbouring ones are alike up to this factor. Codes of eight
-bits are no farther apart, whatever their curve (HLG: 0.021 at the top)."""
-LOW_SHARE, LOW_OF_VARIANCE = 0.25, 0.1015
-"""Noise comes from the lowest quarter of squared differences, for up to three quarters of a picture may be detail: the
-quarter's border as a share of the mean, for one Gaussian number (chi squared)."""
+DARK = 2.0
+"""What is darker than this many standard deviations of the noise between neighbours shows noise without the picture."""
+LEAST_SPREAD = 1.3
+"""Chance, and the edges of what is lit, make differences from farther away larger by up to this."""
+TEXTURE = 0.3
+"""What little light is there may differ from place to place by this share of itself: paint and cloth have less."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,48 +63,94 @@ def noise_of(
     black_level: float = 0.0,
     scale: float = 1.0,
 ) -> PlateNoise:
-    """Return the noise of one channel of plates as ``solve`` takes them, one per light.
+    """Return the noise of plates as ``solve`` takes them, one per light: of one channel, so that its variance over the
+    number of channels is that of their mean.
 
     Second differences along columns and rows (J. Immerkaer, "Fast noise variance estimation", CVIU 1996) leave hardly
     anything of smooth surfaces; the lowest quarter of them at each level leaves edges and texture out. Plates that hold
     a file's codes are never less noisy than rounding makes them: a twelfth of the codes' squared distance at the level.
 
+    Noise that a demosaic or a filter spread is alike in neighbours and in channels: it differs more from farther away
+    (4 px), and in the mean of channels. By how much is seen in the dark, where there is no picture, and holds in
+    light as far as it shows there.
+
     Where more than three lights are known (``lit``), what no normal and albedo explains of the differences is looked at
     as well, and the lesser counts: paint, hair and the grain of a surface obey its lights, and noise does not.
     """
     pixels = SAMPLES // len(plates)
-    found = (_fine(plates[n], n, black_level, scale, pixels) for n in range(len(plates)))
-    detail, level, rounding = map(np.stack, zip(*found, strict=True))
-    if detail.size < LEAST_PIXELS:
+    each = (noise_samples(plates[n], n, black_level, scale, pixels) for n in range(len(plates)))
+    found = [one for one in each if one is not None]
+    if sum(one.beside.detail.size for one in found) < LEAST_PIXELS:
         return PlateNoise(read=LEAST**2, photon=0.0)
-    at, variances = _by_level(detail, level, rounding)
-    alone = _line(at, variances)
+    beside = Differences.of_all([one.beside for one in found])
+    at, variances = _by_level(beside)
+    channels = 1 if len(plates[0].shape) == 2 else plates[0].shape[2]
+    spread = _Spread.of(beside, Differences.of_all([one.apart for one in found]), channels)
+    alone = _line(at, spread.times(at) * variances)
     if lit is None or len(plates) <= 3:
         return alone
     channel = min(1, lit.intensities.shape[1] - 1)
-    left = _left_over(lit.directions * lit.intensities[:, channel, None])
-    sums = (np.einsum("sl,lp->sp", each, of) for each, of in ((left, detail), (left**2, level), (left**2, rounding)))
+    left = _left_over(beside, lit.directions * lit.intensities[:, channel, None])
     dark_share = float(np.clip(1 - at.min() / max(BRIGHT * at.max(), 1e-9), 0, 1))
-    return _lesser(alone, *_by_level(*sums), dark_share=dark_share)
+    at, variances = _by_level(left)
+    return _lesser(alone, at, spread.times(at) * variances, dark_share=dark_share)
 
 
-def _left_over(matrix: Doubles) -> Doubles:
-    """Return the sums of the lights' measurements, (sum, light), to which a normal and an albedo add nothing: unit
-    vectors at right angles, so that each holds the noise of one measurement, at the mean level by its squares."""
-    return np.asarray(np.linalg.qr(matrix, mode="complete")[0][:, 3:].T)
+def _left_over(of: Differences, matrix: Doubles) -> Differences:
+    """Return the sums of the lights' differences to which a normal and an albedo add nothing: by unit vectors at right
+    angles, so that each holds the noise of one measurement, at the mean level by its squares."""
+    left = np.linalg.qr(matrix, mode="complete")[0][:, 3:].T
+    sums = (np.einsum("sl,lp->sp", shares, some) for shares, some in (
+        (left, of.detail), (left**2, of.level), (left**2, of.rounding)
+    ))  # fmt: skip
+    detail, level, rounding = sums
+    return Differences(detail=detail, level=level, rounding=rounding)
 
 
-def _by_level(detail: Doubles, level: Doubles, rounding: Doubles) -> tuple[Doubles, Doubles]:
-    """Return LEVELS levels, and the variance there that differences show, each as large as noise at its level makes it;
-    ``rounding`` is the squared distance of codes."""
-    detail, level, rounding = detail.ravel() ** 2, level.ravel(), rounding.ravel() / 12
+def _by_level(of: Differences) -> tuple[Doubles, Doubles]:
+    """Return LEVELS levels, and the variance there that differences show, each as large as noise at its level makes
+    it."""
+    level = of.level.ravel()
     parts = rising_parts(level, LEVELS)
     at = np.array([(level[part[(len(part) - 1) // 2]] + level[part[len(part) // 2]]) / 2 for part in parts])  # medians
-    found = np.array([quantile(detail[part], LOW_SHARE) / LOW_OF_VARIANCE for part in parts])
-    if not rounding.any():
-        return at, found
-    rounded = np.array([median(rounding[part]) for part in parts])
-    return at, np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
+    return at, np.array([of.variance(part) for part in parts])
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Spread:
+    """How many times as large the variance is as neighbours show it: up to the level ``below``, and in light."""
+
+    below: float = -np.inf
+    in_dark: float = 1.0
+    in_light: float = 1.0
+
+    @classmethod
+    def of(cls, beside: Differences, apart: Differences, channels: int) -> "_Spread":
+        """Light shows more of the picture than of its noise: there it is no more than in the dark."""
+        at, variances = _by_level(beside)
+        below = DARK * float(np.sqrt(variances[np.argmin(at)] / channels))
+        near, far = _in_dark(beside, below, 1), _in_dark(apart, below, channels)
+        if not 0 < LEAST_SPREAD * near < far:
+            return cls()
+        bright = at > BRIGHT * at.max()
+        if not bright.any():
+            return cls(below=below, in_dark=far / near, in_light=far / near)
+        shown = median(_by_level(apart)[1][bright]) / max(median(variances[bright]), 1e-12)
+        return cls(below=below, in_dark=far / near, in_light=min(max(shown, 1.0), far / near))
+
+    def times(self, levels: Doubles) -> Doubles:
+        """Return by what the variance at levels is multiplied."""
+        return np.where(levels <= self.below, self.in_dark, self.in_light)
+
+
+def _in_dark(of: Differences, below: float, channels: int) -> float:
+    """Return the variance in what is darker than ``below``, without what may be texture there of the mean of so many
+    channels; 0 where nothing is dark, or only what are the darkest places of something lit."""
+    dark = np.flatnonzero(of.level.ravel() <= below)
+    if len(dark) < LEAST_PIXELS:
+        return 0.0
+    light = median(of.level.ravel()[dark])
+    return 0.0 if light > below / 2 else of.variance(dark) - channels * (TEXTURE * max(light, 0.0)) ** 2
 
 
 def _line(at: Doubles, found: Doubles) -> PlateNoise:
@@ -140,70 +184,3 @@ def _lesser(alone: PlateNoise, at: Doubles, found: Doubles, *, dark_share: float
     photon = median(np.maximum(found[bright] - left, 0) / at[bright])
     photon = min(photon, max(alone.at(level) ** 2 - read, 0.0) / level)
     return replace(alone, read=read, photon=photon)
-
-
-def _fine(
-    plate: Samples | Mixture, number: int, black_level: float, scale: float, pixels: int
-) -> tuple[Doubles, Doubles, Doubles]:
-    """Return second differences, whose squares white noise makes as large as its variance, the level there, and the
-    squared distance of the plate's codes, 0 where it holds none.
-
-    Differences of codes are few and far between: codes are blurred by their distance first, evenly, every plate's
-    (``number``) in its own way.
-    """
-    rows, cols = plate.shape[:2]
-    if rows < 3 or cols < 3:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
-    step = max((rows - 2) // max(ROWS, pixels // (cols - 2)), 1)
-    firsts = np.arange(0, rows - 2, step)
-    part = rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
-    part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
-    each = max(len(firsts) * (cols - 2) // pixels, 1)
-    lines = part.reshape(3, len(firsts), cols) - np.float32(black_level)
-    lines *= np.float32(scale)
-    codes = _codes_in(lines)
-    if codes is None:
-        fine, level = _differences(lines, each)
-        return fine, level, np.zeros_like(level)
-    blurred = lines.astype(np.float64)
-    gaps = _gaps_between(codes, blurred)
-    blurred += gaps * (np.random.default_rng(number).random(lines.shape) - 0.5)
-    fine, level = _differences(blurred, each)
-    return fine, level, gaps[1, :, 1:-1].ravel()[::each] ** 2
-
-
-def _differences(lines: NDArray[np.floating], each: int) -> tuple[Doubles, Doubles]:
-    """Return of ``lines`` (3, line, col), of which three lie beside each other, the second differences as their squares
-    hold the variance, and the levels there; of every ``each``-th place."""
-    top, middle, bottom = lines
-    down, three = top - 2 * middle + bottom, top + middle + bottom
-    fine = down[:, :-2] - 2 * down[:, 1:-1] + down[:, 2:]
-    level = three[:, :-2] + three[:, 1:-1] + three[:, 2:]  # the same noise is in both, and not correlated
-    return fine.ravel()[::each] / np.float64(6), level.ravel()[::each] / np.float64(9)
-
-
-def _codes_in(values: NDArray[np.floating]) -> Doubles | None:
-    """Return the codes that values are, in rising order, or None where they are none that a file rounded."""
-    some = values.ravel()[:: max(values.size // CODE_SAMPLES, 1)]
-    codes = np.unique(some).astype(np.float64)
-    if not LEAST_CODES <= len(codes) <= len(some) / 2:
-        return None
-    gaps = np.diff(codes)
-    ratios = gaps[1:] / gaps[:-1]
-    fine_or_none = gaps.max() < LEAST or median(gaps) > COARSEST
-    if fine_or_none or np.mean((ratios < ALIKE) & (ratios > 1 / ALIKE)) < 0.5:
-        return None
-    return codes
-
-
-def _gaps_between(codes: Doubles, values: Doubles) -> Doubles:
-    """Return how far from each other codes are at every value."""
-    gaps = np.diff(codes)
-    beside = np.pad(gaps, 1, mode="edge")
-    gaps = np.minimum(gaps, np.minimum(beside[:-2], beside[2:]))  # some codes may not occur
-    return np.asarray(np.interp(values, codes[:-1] + gaps / 2, gaps))
-
-
-def rows_of(plate: Samples | Mixture, rows: NDArray[np.intp]) -> Samples:
-    """Return some rows of a plate, made or not."""
-    return plate.rows(rows) if isinstance(plate, Mixture) else plate[rows]

@@ -12,7 +12,7 @@ from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.plate_noise import rows_of
+from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, fitted, joined
 from psvideo.solve.normals.task import Samples, Usable
 
