@@ -1,14 +1,16 @@
 """Averaging over time takes noise out of what is at rest, leaves alone what moves, and flicker is measured."""
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing
-from psvideo.plates.align.denoise import Average, averaged
+from psvideo.plates.align.denoise import Average, ResultNoise, averaged
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
@@ -16,6 +18,7 @@ from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.facts import InstantFacts, instant_facts
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.run_report import RunReport, report_record, steadiness_of
+from psvideo.solve.instants import Instant, denoised
 
 ROWS, COLS = 96, 128
 
@@ -47,11 +50,11 @@ def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return angles
 
 
-def run(surfaces: list[Surface], results: int) -> list[Surface]:
+def run(surfaces: list[Surface], results: int, noise: ResultNoise | None = None) -> list[Surface]:
     average: Average | None = None
     shown = []
     for one in surfaces:
-        average, new = averaged(average, one, results)
+        average, new = averaged(average, one, results, noise=noise)
         shown.append(new)
     return shown
 
@@ -87,6 +90,123 @@ def test_where_all_of_the_picture_moves_nothing_is_mixed() -> None:
     noisy[1] = replace(noisy[1], normals=np.roll(noisy[1].normals[..., ::-1], 7, axis=1))
     shown = run(noisy, 8)[-1]
     assert (shown.normals == noisy[1].normals).mean() > 0.99
+
+
+BLUR = cv2.getGaussianKernel(7, 0.7)[:, 0]
+ALIKE = np.correlate(BLUR, BLUR, "full")[6:9] / (BLUR**2).sum()
+SPREAD = float((6 - 8 * ALIKE[1] + 2 * ALIKE[2]) / 6) ** -2
+"""How many times as large noise is after a blur of 0.7 px as second differences show it, which along each axis leave
+that of how far it is alike over one and two pixels: 14."""
+
+
+def blurred(rng: np.random.Generator, *, bump_at: float | None = None) -> Surface:
+    """That wall with noise of 0.01 that a filter made alike in neighbours."""
+    true = surface(rng, sigma=0, bump_at=bump_at)
+    noise = cv2.GaussianBlur(rng.normal(size=(ROWS, COLS, 3)), (7, 7), 0.7)
+    vectors = true.albedo[..., None] * true.normals + 0.01 * noise / noise.std()
+    length = np.linalg.norm(vectors, axis=-1)
+    normals = np.asarray(vectors / length[..., None], np.float32)
+    return replace(true, normals=normals, albedo=np.asarray(length, np.float32))
+
+
+def evenly_lit(spread: float = SPREAD) -> ResultNoise:
+    return ResultNoise(light=np.ones((ROWS // 3, -(-COLS // 3)), np.float32), spread=spread)
+
+
+def test_noise_that_a_filter_spread_falls_as_well_where_that_is_known() -> None:
+    rng = np.random.default_rng(1)
+    true, noisy = surface(rng, sigma=0), [blurred(rng) for _ in range(9)]
+    error = {}
+    for spread in (1.0, SPREAD):
+        shown = run(noisy, 9, evenly_lit(spread))[-1]
+        error[spread] = np.sqrt(np.mean(angle_deg(shown.normals, true.normals) ** 2))
+    before = np.sqrt(np.mean(angle_deg(noisy[-1].normals, true.normals) ** 2))
+    assert error[SPREAD] < 1.25 * before / np.sqrt(9)
+    assert error[1.0] > 0.9 * before
+
+
+@pytest.mark.parametrize("step_px", [0.5, 2.0, 15.0])
+def test_what_moves_leaves_no_ghost_in_noise_that_a_filter_spread(step_px: float) -> None:
+    rng = np.random.default_rng(2)
+    places = [30 + step_px * n for n in range(5)]
+    noisy = [blurred(rng, bump_at=at) for at in places]
+    shown = run(noisy, 8, evenly_lit())[-1]
+    true = surface(rng, sigma=0, bump_at=places[-1])
+    y, x = np.mgrid[0:ROWS, 0:COLS]
+    reached = (np.abs(y - 48) < 21) & (x > 9) & (x < places[-1] + 21)
+    error = [angle_deg(one.normals, true.normals)[reached] for one in (noisy[-1], shown)]
+    assert error[1].mean() < error[0].mean() + 0.02
+    assert np.percentile(error[1], 99) < 1.1 * np.percentile(error[0], 99)
+
+
+@pytest.mark.parametrize("step_px", [1, 2])
+@pytest.mark.parametrize("wide_px", [3.0, 8.0])
+def test_a_picture_that_moves_as_a_whole_is_no_worse_for_averaging(step_px: int, wide_px: float) -> None:
+    """All of it is textured, and fine detail that moves is taken for noise: of that, little may be averaged."""
+    rng = np.random.default_rng(5)
+    slopes = cv2.GaussianBlur(rng.normal(size=(ROWS, 2 * COLS, 2)), (0, 0), wide_px)
+    relief = np.dstack([0.1 * slopes / slopes.std(), np.ones((ROWS, 2 * COLS))])
+    relief /= np.linalg.norm(relief, axis=-1, keepdims=True)
+    noisy, true = [], relief
+    for n in range(6):
+        true = relief[:, step_px * n :][:, :COLS]
+        noise = cv2.GaussianBlur(rng.normal(size=(ROWS, COLS, 3)), (7, 7), 0.7)
+        vectors = 0.5 * true + 0.005 * noise / noise.std()
+        length = np.linalg.norm(vectors, axis=-1)
+        normals = np.asarray(vectors / length[..., None], np.float32)
+        valid = np.ones((ROWS, COLS), np.bool_)
+        noisy.append(Surface(normals=normals, albedo=np.asarray(length, np.float32), valid=valid))
+    shown = run(noisy, 8, evenly_lit())[-1]
+    error = [angle_deg(one.normals, true).mean() for one in (noisy[-1], shown)]
+    assert error[1] < 1.05 * error[0]
+
+
+def test_noise_that_grows_with_light_is_averaged_where_light_is_brightest() -> None:
+    """One albedo, lit from 0.1 to 0.9 across: its variance grows nine times."""
+    rng = np.random.default_rng(4)
+    light = np.broadcast_to(np.linspace(0.1, 0.9, COLS), (ROWS, COLS))
+    vectors = [
+        0.5 * np.array([0.0, 0.0, 1.0]) + 0.01 * np.sqrt(light)[..., None] * rng.normal(size=(ROWS, COLS, 3))
+        for _ in range(8)
+    ]
+    length = [np.linalg.norm(one, axis=-1) for one in vectors]
+    noisy = [
+        Surface(
+            normals=np.asarray(one / size[..., None], np.float32),
+            albedo=np.asarray(size, np.float32),
+            valid=np.ones((ROWS, COLS), np.bool_),
+        )
+        for one, size in zip(vectors, length, strict=True)
+    ]
+    average: Average | None = None
+    noise = ResultNoise(light=np.ascontiguousarray(light[::3, ::3], np.float32))
+    for one in noisy:
+        average, _ = averaged(average, one, 8, noise=noise)
+    assert average is not None
+    assert average.count[:, -30:].mean() > 7.5
+
+
+def instants(numbers: Sequence[int]) -> Iterator[Instant]:
+    for number in numbers:
+        one = surface(np.random.default_rng(number))
+        plates = [
+            LightPlate(
+                light=light,
+                number=number,
+                time_s=float(number),
+                picture=mixture_of(one.albedo),
+                seen=np.ones(ROWS, np.bool_),
+            )
+            for light in "abc"
+        ]
+        yield Instant(round=Round(number=number, plates=tuple(plates)), surface=one)
+
+
+def test_after_a_hole_in_the_numbers_an_average_begins_afresh() -> None:
+    with_before = {one.round.number: one.surface for one in denoised(instants([3, 4, 5, 30, 31, 32]), 3)}
+    alone = {one.round.number: one.surface for one in denoised(instants([30, 31, 32]), 3)}
+    for number, found in alone.items():
+        np.testing.assert_array_equal(with_before[number].normals, found.normals)
 
 
 def test_equal_results_stay_as_they_are_and_what_is_not_valid_stays_so() -> None:

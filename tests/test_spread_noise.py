@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from psvideo.clip import demosaic
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.plate_noise import noise_of
+from psvideo.solve.normals.plate_noise import noise_of, spread_of
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.passes.asked_passes import AskedPasses, passes_of
 
@@ -142,3 +142,18 @@ def test_two_thirds_of_errors_are_as_claimed(solved: tuple[list[NDArray[np.float
     assert surface.error_deg is not None
     assert surface.valid[lit].mean() > 0.99
     assert 0.66 < np.mean((off_deg <= surface.error_deg)[lit]) < 0.95
+
+
+@pytest.mark.parametrize(
+    ("camera", "least", "most"), [("white", 1.0, 1.0), ("mosaic", 2.2, 4.5), ("blurred by 0.7 px", 9, 20)]
+)
+def test_how_much_of_it_neighbours_show_is_known_of_the_mean_of_channels(
+    camera: str, least: float, most: float
+) -> None:
+    plates = plates_of(CAMERAS[camera], shaded())
+    assert least <= spread_of(plates) <= most
+
+
+def test_a_wall_that_fills_the_picture_shows_no_spread() -> None:
+    wall = np.full((5, ROWS, COLS, 3), 0.3)
+    assert spread_of(plates_of(through_a_mosaic, wall)) == 1.0

@@ -20,12 +20,13 @@ from psvideo.model.irradiance.intensity import (
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Subject, Surface
-from psvideo.plates.align.denoise import Average, added, averaged
+from psvideo.plates.align.denoise import Average, ResultNoise, added, averaged
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.solve.depth import View, view_of
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.plate_noise import spread_of
 from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving
@@ -259,12 +260,14 @@ def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:
     """
     average: Average | None = None
     later: Average | None = None
-    block: int | None = None
+    block = 0
     for instant in instants:
-        if block != (block := instant.round.number // results):
-            average, later = later or average, None
+        if block != (own := instant.round.number // results):
+            average, later, block = later if own == block + 1 else None, None, own
         together = later is average
-        average, surface = averaged(average, instant.surface, results)
-        later = average if together else added(later, instant.surface, results)
+        plates = instant.round.plates
+        noise = ResultNoise.of(plates, spread_of([plate.picture for plate in plates]))
+        average, surface = averaged(average, instant.surface, results, noise=noise)
+        later = average if together else added(later, instant.surface, results, noise=noise)
         yield replace(instant, surface=surface)
         del instant, surface

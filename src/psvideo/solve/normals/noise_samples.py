@@ -54,18 +54,19 @@ class Differences:
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseSamples:
-    """``beside``: how neighbours differ in one channel. ``apart``: how the mean of channels differs over APART_PX,
-    times the root of their number: as much, where noise is white and every channel has its own of the same size. Its
-    level is that of the mean. Small pictures have no places of these."""
+    """``beside``: how neighbours differ in one channel, or in the mean of all. ``apart``: how the mean differs over
+    APART_PX. Means are times the root of the channels' number: as much as one, where noise is white and every channel
+    has its own of the same size. Small pictures have no places apart."""
 
     beside: Differences
     apart: Differences
 
 
 def noise_samples(
-    plate: Samples | Mixture, number: int, black_level: float, scale: float, pixels: int
+    plate: Samples | Mixture, number: int, black_level: float, scale: float, pixels: int, *, grey: bool = False
 ) -> NoiseSamples | None:
-    """Return what about so many pixels of a plate show, None of one that is smaller than 3 x 3.
+    """Return what about so many pixels of a plate show, None of one that is smaller than 3 x 3; ``grey``: of the mean
+    of channels also beside.
 
     Differences of codes are few and far between: codes are blurred by their distance first, evenly, every plate's
     (``number``) in its own way.
@@ -84,11 +85,15 @@ def noise_samples(
         part *= np.float32(scale)
         return np.moveaxis(part.reshape(3, len(firsts), cols, -1), -1, 0)
 
+    def of_mean(channels: NDArray[np.floating], px: int) -> Differences:
+        blurred, gaps = zip(*(_blurred(channel, rng) for channel in channels), strict=True)
+        found = _differences(np.mean(blurred, axis=0), np.sqrt(np.mean(np.square(gaps), axis=0)), px, each)
+        return replace(found, detail=found.detail * np.sqrt(len(blurred)))
+
     channels = lines(firsts, 1)
-    beside = _differences(*_blurred(channels[min(1, len(channels) - 1)], rng), 1, each)
-    blurred, gaps = zip(*(_blurred(channel, rng) for channel in lines(wide, APART_PX)), strict=True)
-    apart = _differences(np.mean(blurred, axis=0), np.sqrt(np.mean(np.square(gaps), axis=0)), APART_PX, each)
-    return NoiseSamples(beside=beside, apart=replace(apart, detail=apart.detail * np.sqrt(len(blurred))))
+    one = channels[min(1, len(channels) - 1)]
+    beside = of_mean(channels, 1) if grey else _differences(*_blurred(one, rng), 1, each)
+    return NoiseSamples(beside=beside, apart=of_mean(lines(wide, APART_PX), APART_PX))
 
 
 def _differences(lines: NDArray[np.floating], gaps: Doubles, px: int, each: int) -> Differences:

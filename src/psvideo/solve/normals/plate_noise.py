@@ -96,6 +96,17 @@ def noise_of(
     return _lesser(alone, at, spread.times(at) * variances, dark_share=dark_share)
 
 
+def spread_of(plates: Sequence[Samples] | Sequence[Mixture]) -> float:
+    """Return how many times as large as neighbours show it the noise of plates is under light, as a variance, in the
+    mean of their channels; 1.0 where no dark shows it."""
+    found = [noise_samples(plates[n], n, 0.0, 1.0, SAMPLES // len(plates), grey=True) for n in range(len(plates))]
+    known = [one for one in found if one is not None]
+    if sum(one.apart.detail.size for one in known) < LEAST_PIXELS:
+        return 1.0
+    beside, apart = (Differences.of_all(each) for each in ([one.beside for one in known], [one.apart for one in known]))
+    return _Spread.of(beside, apart, 1 if len(plates[0].shape) == 2 else plates[0].shape[2]).in_light
+
+
 def _left_over(of: Differences, matrix: Doubles) -> Differences:
     """Return the sums of the lights' differences to which a normal and an albedo add nothing: by unit vectors at right
     angles, so that each holds the noise of one measurement, at the mean level by its squares."""
