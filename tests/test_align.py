@@ -669,3 +669,23 @@ def test_what_moves_over_many_rows_is_whole_and_what_rests_beside_it_stays(step:
     assert plate.pixels_seen.all()
     kept = np.r_[0 : moving_cols.start - 3, moving_cols.stop + 3 : cols]
     np.testing.assert_allclose(plate.image[:, kept], still[:, kept], rtol=0, atol=1e-5)  # held in 16 bits
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (4, 4), (7, 200), (8, 8), (8, 12), (11, 11), (12, 12)])
+@pytest.mark.parametrize("how", ["auto", "flow"])
+def test_pictures_of_a_few_pixels_are_brought_together_without_flow(shape: tuple[int, int], how: Any) -> None:
+    rng = np.random.default_rng(0)
+    plates = [
+        LightPlate(
+            light=light,
+            number=1000 + number,
+            time_s=float(4 * number + place),
+            picture=mixture_of((0.5 * rng.random(shape)).astype(np.float32)),
+            seen=np.ones(shape[0], np.bool_),
+        )
+        for number in range(1, 4)
+        for place, light in enumerate("abcd")
+    ]
+    found = list(aligned(plates, tuple("abcd"), Aligning(align=how), first=1001))
+    assert [one.number for one in found] == [1001, 1002, 1003]
+    assert all(plate.shape == shape and np.isfinite(plate.image).all() for one in found for plate in one.plates)

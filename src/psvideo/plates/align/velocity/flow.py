@@ -28,6 +28,8 @@ FINEST_SCALE, FINE_PIXELS = 1, 250_000
 """Flow is found on half the sketch and enlarged where sketches have this many pixels: good to a twentieth of one."""
 REFINED, DESCENTS = 1, 12
 """Rounds of refinement and steps of a patch there: 5 and 16 take half as long again, and gain a 150th of a pixel."""
+SHORTEST_PX, LONGEST_PX = 8, 12
+"""Flow needs pictures of so many pixels along the shorter side and along the longer one: smaller ones are at rest."""
 BLOCK_PX, AROUND = 4, 4
 """Change is measured on means of blocks this wide, over this many blocks together."""
 LEAST_CHANGE = 1.5
@@ -159,8 +161,10 @@ def _spread(change: NDArray[Any], shown: NDArray[Any], step: int = 1) -> float:
 def flow_from(one: Codes8, other: Codes8, start_px: tuple[float, float] | None = None) -> Floats:
     """Return the way from every pixel of one picture to the other, (row, col, 2) as (x right, y down), px.
 
-    ``start_px`` is where it is looked for; left out, nearby.
+    ``start_px`` is where it is looked for; left out, nearby. It is 0 in pictures that are too small for flow.
     """
+    if min(one.shape) < SHORTEST_PX or max(one.shape) < LONGEST_PX:
+        return np.zeros((*one.shape, 2), np.float32)
     search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     if one.size >= FINE_PIXELS:
         search.setFinestScale(FINEST_SCALE)
