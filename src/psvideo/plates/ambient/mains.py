@@ -55,7 +55,7 @@ class Mains:
     """What dark slots showed of mains light up to the one whose ``rows`` these are.
 
     ``last`` is what the last pair of slots showed, ``agreed`` what two pairs agreed on, ``unseen`` slots ago;
-    ``named_timing`` is what the whole clip showed when it was timed.
+    ``timed`` is what the whole clip showed when it was timed.
     """
 
     rows: RowLight
