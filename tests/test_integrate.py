@@ -323,6 +323,18 @@ def test_scale_stays_when_the_mask_flickers(view: View) -> None:
     assert np.abs(alone.depth - first.first.depth)[less].max() > 2e-2  # which is what the first instant is for
 
 
+def test_what_comes_nearer_than_the_width_of_a_narrow_picture_keeps_its_scale() -> None:
+    """A plane at 45 degrees, 160 pixels high and 40 wide: from 3 to -1 widths. Later only its nearer half shows."""
+    normals = np.broadcast_to(np.sqrt(0.5) * np.array([0, 1, 1], np.float32), (160, 40, 3))
+    everywhere, nearer = np.ones((160, 40), np.bool_), np.zeros((160, 40), np.bool_)
+    nearer[120:] = True
+    first = begun(Shaping(view=View()), surface(normals, everywhere))
+    assert first.first is not None
+    assert (first.first.depth[nearer] < 0).mean() > 0.9
+    later = depth_of(first, surface(normals, nearer))
+    assert np.abs(later.depth - first.first.depth)[nearer].max() < 5e-3
+
+
 def test_what_is_not_known_is_said() -> None:
     normals, _ = plane(PINHOLE, (0, 0, 1))
     both = surface(normals, two_plates())

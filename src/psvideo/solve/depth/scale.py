@@ -204,18 +204,20 @@ def _depth_of(height: Doubles, view: View, width_px: int) -> Doubles:
 
 
 def _known(depth: NDArray[np.float32], view: View) -> _Anchor:
-    """Return heights that are known as depth, where that is above 0."""
+    """Return heights that are known as depth: where that is above 0, and orthographic where it is not 0."""
     width_px = depth.shape[1]
-    return _Anchor(
-        heights=lambda box: _height_of(depth[box], view, width_px), seen=lambda box: depth[box] > 0, plane=depth
-    )
+
+    def seen(box: Box) -> Mask:
+        return np.asarray(depth[box] > 0 if view.perspective else depth[box] != 0)
+
+    return _Anchor(heights=lambda box: _height_of(depth[box], view, width_px), seen=seen, plane=depth)
 
 
 def _height_of(depth: NDArray[np.float32], view: View, width_px: int) -> Doubles:
-    """The inverse of ``_depth_of``; anything where the depth is not above 0."""
-    there = np.where(depth > 0, depth, 1).astype(np.float64)
+    """The inverse of ``_depth_of``; anything where no depth is known."""
     if view.focal_px is None:
-        return (there - 1.0) * width_px
+        return (depth.astype(np.float64) - 1.0) * width_px
+    there = np.where(depth > 0, depth, 1).astype(np.float64)
     height: Doubles = np.log(there) * view.focal_px[0]
     return height
 
