@@ -689,3 +689,22 @@ def test_pictures_of_a_few_pixels_are_brought_together_without_flow(shape: tuple
     found = list(aligned(plates, tuple("abcd"), Aligning(align=how), first=1001))
     assert [one.number for one in found] == [1001, 1002, 1003]
     assert all(plate.shape == shape and np.isfinite(plate.image).all() for one in found for plate in one.plates)
+
+
+@pytest.mark.parametrize("codes", [1.0, 1.9, 3.1, 5.0])
+def test_noise_of_a_few_codes_is_known_between_whole_ones(codes: float) -> None:
+    """White noise on a wall of code 120, by which two sketches differ; rounding adds a sixth of a squared code."""
+    rng = np.random.default_rng(2)
+    rounded = [np.rint(120 + rng.normal(0, codes / np.sqrt(2), (240, 320))).astype(np.uint8) for _ in range(2)]
+    before, after = (
+        flow.Sketch(
+            number=number,
+            time_s=float(number),
+            codes=each,
+            seen=np.ones((240, 1), np.bool_),
+            blocks=each[::4, ::4].astype(np.float32),
+            white=1.0,
+        )
+        for number, each in enumerate(rounded)
+    )
+    assert flow.noise_between(before, after) == pytest.approx(np.hypot(codes, np.sqrt(1 / 6)), rel=0.06)

@@ -154,8 +154,18 @@ def _spread(change: NDArray[Any], shown: NDArray[Any], step: int = 1) -> float:
     fine = fine[shown[:, step:-step] >= LEAST_LIT]
     if fine.size < 64:
         return 0.0
-    quarter = np.partition(fine, fine.size // 4)[fine.size // 4]
-    return float(quarter) / QUARTER_OF_NORMAL / float(np.sqrt(6))
+    return _quarter(fine) / QUARTER_OF_NORMAL / float(np.sqrt(6))
+
+
+def _quarter(sizes: NDArray[Any]) -> float:
+    """Return what a quarter of sizes, 0 and more, lies below; whole numbers stand for all that is rounded to them."""
+    place = sizes.size // 4
+    quarter = np.partition(sizes, place)[place]
+    if not np.issubdtype(sizes.dtype, np.integer):
+        return float(quarter)
+    below, alike = np.count_nonzero(sizes < quarter), np.count_nonzero(sizes == quarter)
+    least = max(float(quarter) - 0.5, 0.0)
+    return least + (float(quarter) + 0.5 - least) * (place + 0.5 - below) / alike
 
 
 def flow_from(one: Codes8, other: Codes8, start_px: tuple[float, float] | None = None) -> Floats:
