@@ -13,6 +13,8 @@ from psvideo.solve.normals.task import Samples
 
 APART_PX = 4
 """Demosaicing and filters make neighbours alike: over less than this. It is even, for mosaics repeat after two."""
+FEWER = 3
+"""Of large pictures so many times fewer rows are looked at for what is apart, and more of each."""
 ROWS = 24
 """Noise is looked for around about this many rows of every plate, evenly spread: of small pictures around more."""
 CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST, FINEST = 1 << 12, 5, 1.25, 0.025, 0.0003
@@ -76,8 +78,9 @@ def noise_samples(
         return None
     step = max((rows - 2) // max(ROWS, pixels // (cols - 2)), 1)
     firsts = np.arange(0, rows - 2, step)
-    wide = firsts[firsts < rows - 2 * APART_PX] if cols > 2 * APART_PX else firsts[:0]
     each, rng = max(len(firsts) * (cols - 2) // pixels, 1), np.random.default_rng(number)
+    fewer = min(each, FEWER)
+    wide = firsts[firsts < rows - 2 * APART_PX][::fewer] if cols > 2 * APART_PX else firsts[:0]
 
     def lines(firsts: NDArray[np.intp], px: int) -> NDArray[np.floating]:
         """Return lines that lie ``px`` apart, three by three, (channel, 3, line, col)."""
@@ -85,15 +88,15 @@ def noise_samples(
         part *= np.float32(scale)
         return np.moveaxis(part.reshape(3, len(firsts), cols, -1), -1, 0)
 
-    def of_mean(channels: NDArray[np.floating], px: int) -> Differences:
+    def of_mean(channels: NDArray[np.floating], px: int, each: int) -> Differences:
         blurred, gaps = zip(*(_blurred(channel, rng) for channel in channels), strict=True)
         found = _differences(np.mean(blurred, axis=0), np.sqrt(np.mean(np.square(gaps), axis=0)), px, each)
         return replace(found, detail=found.detail * np.sqrt(len(blurred)))
 
     channels = lines(firsts, 1)
     one = channels[min(1, len(channels) - 1)]
-    beside = of_mean(channels, 1) if grey else _differences(*_blurred(one, rng), 1, each)
-    return NoiseSamples(beside=beside, apart=of_mean(lines(wide, APART_PX), APART_PX))
+    beside = of_mean(channels, 1, each) if grey else _differences(*_blurred(one, rng), 1, each)
+    return NoiseSamples(beside=beside, apart=of_mean(lines(wide, APART_PX), APART_PX, each // fewer))
 
 
 def _differences(lines: NDArray[np.floating], gaps: Doubles, px: int, each: int) -> Differences:
