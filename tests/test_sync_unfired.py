@@ -1,6 +1,7 @@
 """A flash that never fired, a light that dies during the clip, a black frame: named, incomplete, and no plate."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,11 @@ from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched, row_weights
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
+from psvideo.sync.flashes_seen import flashes_of_fit
+from psvideo.sync.rowfit.fit import find
+from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.tracking.course import window_frames
+from psvideo.sync.unfired import incomplete, unfired_of
 from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -56,7 +62,7 @@ def held_against(plan: Plan, shot: Exposure, timing: Timing) -> list[bool]:
     return listed
 
 
-@pytest.mark.parametrize("skipped", [(41,), (60, 62), (30, 70, 97)])
+@pytest.mark.parametrize("skipped", [(41,), (60, 62), (30, 70, 97), (5, 6, 7)])
 def test_flashes_that_never_fired_are_named_and_incomplete(skipped: tuple[int, ...], plan: Plan) -> None:
     shot = shot_of(plan, lambda flash: flash.index in skipped)
     timing = timing_of(plan, shot)
@@ -142,6 +148,35 @@ def test_below_360_degrees_a_flash_that_few_rows_see_is_missing_if_these_are_dar
     assert held_against(plan, shot, timing) == [flash.index != few for flash in whole]
     assert len(timing.notes) == 1
     assert "1 flash never fired" in timing.notes[0]
+
+
+@pytest.mark.parametrize(("begins", "ends"), [(6.5, None), (5.2, None), (None, 133.4)])
+def test_where_a_strobe_began_or_stopped_no_flash_beyond_is_complete(
+    begins: float | None, ends: float | None, plan: Plan
+) -> None:
+    """A part of a clip with a few frames in the dark, in which several flashes in a row would have fired."""
+    period_s = plan.camera.frame_period_s
+    first_s, last_s = (begins or 0.0) * period_s, (ends or FRAMES) * period_s
+    whole, part = (
+        shot_of(plan, dead).frames.mean(axis=2, dtype=np.float64)
+        for dead in (lambda _: False, lambda flash: not first_s < flash.start_s < last_s)
+    )
+    rows = Profiles(
+        value=whole,
+        index=np.arange(FRAMES),
+        period_s=period_s,
+        place=np.arange(48.0),
+        window_start=np.zeros(1, np.int64),
+    )
+    found = find(plan, rows.windowed(window_frames(plan)))
+    flashes = flashes_of_fit(plan, found, found.fit.beat)
+    found = replace(found, rows=replace(found.rows, value=part))
+    unfired = unfired_of(plan, found, flashes, breaks=(begins is not None, ends is not None))
+    lit = [flash for flash in incomplete(flashes, unfired.never | unfired.beside) if flash.lights]
+    dark = [flash for flash in lit if not first_s - 1e-5 < flash.start_s < last_s]
+    assert len(dark) >= 3
+    assert not any(flash.complete for flash in dark)
+    assert sum(flash.complete for flash in lit) >= len(lit) - len(dark) - 2
 
 
 def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(plan: Plan) -> None:

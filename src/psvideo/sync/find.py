@@ -178,7 +178,7 @@ def _timing(take: _Take, strobe: "FoundStrobe", *, breaks: tuple[bool, bool] = (
     seen = incomplete(seen, unfired.beside)
     fired = incomplete(seen, unfired.never)
     notes = (
-        *remarks(plan, found, steady=only_fired(found, seen, fired)),
+        *remarks(plan, found, steady=only_fired(found, seen, unfired)),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
         *remarks_on_frames(plan, found, take.indices),
         *remarks_on_black(found, black, take.numbers),

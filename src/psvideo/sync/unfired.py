@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Doubles, Integers
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import Pulse
 from psvideo.model.timing import Flash
@@ -59,8 +59,8 @@ class _Levels:
 
 @dataclass(frozen=True, kw_only=True)
 class Unfired:
-    """Flashes by their ``index``: those that ``never`` fired, and those of the same lights ``beside`` them of which too
-    little was seen to know."""
+    """Flashes by their ``index``: those that ``never`` fired, and those ``beside`` them, or beside where the strobe
+    began or stopped, that may not have fired either."""
 
     never: frozenset[int]
     beside: frozenset[int]
@@ -74,7 +74,8 @@ def unfired_of(
 
     A flash of which too little was seen, as below 360 degrees most that fall between two exposures, is one where those
     of its light before and after are, and may be one where one of them is. ``breaks``: whether the strobe began at the
-    first frame, or stopped at the last, which flashes beyond all that were seen well may not have seen.
+    first frame, or stopped at the last, or some frames off: flashes beyond all that are seen to give light may not
+    have fired.
 
     One light's flashes, with those of others between them, under ``breaks`` (True, False). What they give is 1, 0 or
     not known; ``told`` are those of which it is::
@@ -91,7 +92,7 @@ def unfired_of(
     lit = [flash for flash in flashes if not flash.is_dark]
     if not lit:
         return Unfired(never=frozenset(), beside=frozenset())
-    off, told = _unfired(plan, found, lit)
+    off, told, gives = _unfired(plan, found, lit)
     never, beside = set[int](), set[int]()
     for slot in plan.lit_slots:
         own = [n for n, flash in enumerate(lit) if flash.slot == slot]
@@ -101,10 +102,10 @@ def unfired_of(
             dead = [bool(off[k]) for k in around if k is not None]
             if any(dead):
                 (never if all(dead) else beside).add(lit[n].index)
-    seen = np.flatnonzero(told)
-    early, late = (lit[: seen[0]], lit[seen[-1] + 1 :]) if len(seen) else ([], [])
+    shows = np.flatnonzero(gives)
+    early, late = (lit[: shows[0]], lit[shows[-1] + 1 :]) if len(shows) else ([], [])
     beside.update(flash.index for there, some in zip(breaks, (early, late), strict=True) if there for flash in some)
-    return Unfired(never=frozenset(never), beside=frozenset(beside))
+    return Unfired(never=frozenset(never - beside), beside=frozenset(beside))
 
 
 def incomplete(flashes: Sequence[Flash], those: frozenset[int]) -> tuple[Flash, ...]:
@@ -112,8 +113,9 @@ def incomplete(flashes: Sequence[Flash], those: frozenset[int]) -> tuple[Flash, 
     return tuple(replace(one, complete=one.complete and one.index not in those) for one in flashes)
 
 
-def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which of the lit flashes never fired, and of which enough was seen to tell, both of shape (flash,)."""
+def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[Mask, Mask, Mask]:
+    """Return which of the lit flashes never fired, of which enough was seen to tell, and which are seen to give some
+    light, all of shape (flash,)."""
     slot = np.array([flash.slot for flash in lit])
     levels = _levels(plan, found, lit)
     share, error = np.full(len(lit), np.nan), np.full(len(lit), np.inf)
@@ -124,14 +126,14 @@ def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[NDArray[
             error[slot == one] = levels.error[slot == one] / level
     known = np.where([flash.complete for flash in lit], share, np.nan)
     around = _around(known, max(AROUND, len(plan.lit_slots)))
-    fires = share > GOES_ON
+    fires, gives = share > GOES_ON, share > NONE
     share, error = share / around, error / around
     off = (share < NONE) & (around > GOES_ON) & (share + SURE * error < GOES_ON)
     for one in plan.lit_slots:
-        fired = share[(slot == one) & (share > GOES_ON)]
+        fired = share[(slot == one) & (share > GOES_ON) & (around > GOES_ON)]
         scatter = 1.4826 * float(np.median(np.abs(fired - np.median(fired)))) if len(fired) >= LEAST_FIRED else np.inf
         off &= (slot != one) | (1 - share > SURE * scatter)
-    return off, np.isfinite(share) & (fires | (around > GOES_ON))
+    return off, np.isfinite(share) & (fires | (around > GOES_ON)), gives
 
 
 def _usual(level: Doubles) -> float:
@@ -145,18 +147,17 @@ def _usual(level: Doubles) -> float:
 def _around(share: Doubles, reach: int) -> Doubles:
     """Return what flashes that fired give of their own light just before and after each one, shape (flash,).
 
-    A ``share`` (flash,) is NaN where it is not known. Those that give less than half of the most on either side, or of
-    the lesser of the two, did not fire themselves: ``1 1 0 0 0 1 1`` are three flashes in whose place light went on,
-    ``1 1 0 0 0 0 0`` may be a subject that left.
+    A ``share`` (flash,) is NaN where it is not known. Light goes on where most of the nearest flashes give it, or where
+    one on either side does: ``1 1 0 0 0 1 1`` are three in whose place it went on, ``1 1 0 0 0 0 0`` may be a subject
+    that left. Those that give less than half of that did not fire themselves.
     """
     beside = np.array([n for n in range(-reach, reach + 1) if n])
     at = np.arange(len(share))[:, None] + beside
-    inside = (at >= 0) & (at < len(share))
-    near = np.where(inside, share[np.clip(at, 0, len(share) - 1)], np.nan)
-    most = np.stack([np.fmax.reduce(near[:, side], axis=1) for side in (beside < 0, beside > 0)])
-    goes_on = np.nan_to_num(np.fmin.reduce(most, axis=0))
+    near = np.where((at >= 0) & (at < len(share)), share[np.clip(at, 0, len(share) - 1)], np.nan)
+    near[np.isnan(near[:, np.abs(beside) <= AROUND]).all(axis=1)] = 0.0
+    sides = [np.fmax.reduce(near[:, side], axis=1) for side in (beside < 0, beside > 0)]
+    goes_on = np.fmax(np.nanmedian(near[:, np.abs(beside) <= AROUND], axis=1), np.minimum(*sides))
     fired = np.where(near >= GOES_ON * goes_on[:, None], near, np.nan)
-    fired[np.isnan(fired).all(axis=1)] = 0.0
     found: Doubles = np.maximum(np.minimum(np.nanmedian(fired, axis=1), goes_on), 1e-9)
     return found
 
@@ -257,10 +258,10 @@ def _solved(design: Doubles, value: Doubles) -> Doubles:
     return found
 
 
-def only_fired(found: ClipFit, flashes: Sequence[Flash], fired: Sequence[Flash]) -> ClipFit:
-    """Return the fit with only those frames that saw nothing of the complete ``flashes`` that never ``fired``: their
+def only_fired(found: ClipFit, flashes: Sequence[Flash], unfired: Unfired) -> ClipFit:
+    """Return the fit with only those frames that saw nothing of ``flashes`` that did not fire, or may not have: their
     light says nothing of the camera's exposure."""
-    lost = _lost(flashes, fired)
+    lost = [flash for flash in flashes if flash.index in unfired.never | unfired.beside]
     if not lost:
         return found
     first = _first_frame(found, np.array([flash.start_s for flash in lost]))
