@@ -238,10 +238,11 @@ def _reference(samples: Array, lit: Illumination, seen: NDArray[np.bool_]) -> tu
         return nothing
     together = values @ (weights / weights.sum())
     shares = together * strength.mean() / strength
-    limit = max(DEFAULT.dark_level, DEFAULT.shadow_ratio * shares[here].mean())
-    if np.abs(shares[here] - limit).min() < 1e-5:
+    limit = np.full(lights, DEFAULT.shadow_ratio * shares[here].mean())
+    dark = DEFAULT.dark_level * _noisiness(lit)
+    if min(np.abs(shares - limit)[here].min(), np.abs(together - dark)[here].min()) < 1e-5:
         return None
-    used = here & (shares > limit)
+    used = here & (shares > limit) & (together > dark)
     if used.sum() < 3:
         return nothing
     matrix = lit.directions * (strength / strength.mean())[:, None]
@@ -269,6 +270,13 @@ def _channel_weights(colour: Array, lit: Illumination) -> Array:
     alike = colour / noise @ np.ones_like(colour) / (1 / noise).sum()
     own = np.sqrt(noise.min() / noise)
     return np.asarray((own * colour + (1 - own) * alike) / noise)
+
+
+def _noisiness(lit: Illumination) -> Array:
+    """How noisy every light's measurement of a grey surface is, over their root mean square."""
+    times = lit.intensities.mean(axis=1, keepdims=True) / lit.intensities
+    variances = (times**2 / (times**2).mean(axis=0) ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(variances / variances.mean()))
 
 
 def _frobenius_condition(matrix: Array) -> float:

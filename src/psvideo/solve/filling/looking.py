@@ -58,7 +58,7 @@ def mark_lit_rows(task: Task, work: Work, wanted: Bytes, lit: Bytes, first: int,
                 continue
             read_block(t, values, row, col, n)
             for light in range(t.lights):
-                per, samples = t.per_strength[light], samples_of(t, light, row * t.cols + col, n)
+                samples, dark = samples_of(t, light, row * t.cols + col, n), t.dark[light]
                 for i in range(n):
                     if not asked[row, col + i]:
                         continue
@@ -66,7 +66,7 @@ def mark_lit_rows(task: Task, work: Work, wanted: Bytes, lit: Bytes, first: int,
                     for channel in range(channels):
                         bright += values[light * channels + channel, i] * t.shares[channel]
                     over = is_clipped(t, samples, light, i) and is_seen(t.seen, light, row, col + i)
-                    if over or bright * at(per, i) * share > t.dark:
+                    if over or bright * share > dark:
                         found[row, col + i] = 1
 
 
@@ -90,7 +90,7 @@ def look_rows(
             read_block(t, values, row, col, n)
             place = begin
             for light in range(t.lights):
-                lamp, per = of_light(t.matrix, light), t.per_strength[light]
+                lamp, per, dark = of_light(t.matrix, light), t.per_strength[light], t.dark[light]
                 place = begin - 1
                 for i in range(n):
                     if not asked[row, col + i]:
@@ -102,9 +102,9 @@ def look_rows(
                     for channel in range(channels):
                         level += values[light * channels + channel, i] * share
                         shows += values[light * channels + channel, i] * share * t.shares[channel]
-                    one = at(per, i)
-                    if not shows * one > t.dark:
+                    if not shows > dark:
                         continue
+                    one = at(per, i)
                     level *= one * scale
                     if count[place] < MOST_COUNTED:
                         count[place] += 1

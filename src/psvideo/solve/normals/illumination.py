@@ -49,6 +49,14 @@ class Illumination:
         times = self.intensities.mean(axis=1, keepdims=True) / self.intensities
         return float(1 / total), float((shares**2 * times).sum(axis=1).mean() / total**2)
 
+    @cached_property
+    def noisiness(self) -> Doubles:
+        """How noisy a light's measurement is, its channels combined (light,), over all lights' root mean square:
+        1 for all where their colours are alike, whatever their strengths."""
+        divided_by = self.intensities / self.intensities.mean(axis=1, keepdims=True)
+        squares = (self.shares**2 / divided_by**2).sum(axis=1)
+        return np.asarray(np.sqrt(squares / squares.mean()))
+
     @property
     def singular_values(self) -> Doubles:
         """The three singular values of the directions, largest first; the last is 0 where all lie in one plane."""

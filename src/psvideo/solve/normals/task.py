@@ -35,10 +35,11 @@ _NO_LIMIT = -1e9
 class Usable:
     """Which measurements a pixel's solution may use, in units of the plates (1.0 = sensor saturation).
 
-    A measurement counts where it is seen, below ``saturation`` in all channels, and, taken relative to its light's
-    intensity (1 = the rig's mean), above ``dark_level`` and above ``shadow_ratio`` times the mean of the pixel's
-    measurements: in shadow, attached or cast, a surface does not show n . d. A light that grazes the surface is left
-    out with them, which costs little.
+    A measurement counts where it is seen, below ``saturation`` in all channels, above ``dark_level`` as it is, whatever
+    its light's strength, for noise in the dark is no less under a weak lamp or a distant one (where lights' colours
+    differ, more of it under those whose channels are noisier); and where it is, relative to what its light sends there,
+    above ``shadow_ratio`` times the mean of the pixel's measurements: in shadow, attached or cast, a surface does not
+    show n . d. A light that grazes the surface is left out with them, which costs little.
     """
 
     saturation: float = 1.0
@@ -84,8 +85,8 @@ class Task(NamedTuple):
     origin: Floats  # (3,): what black samples would give with it, to be added
     least: np.float32  # the smallest 1 / intensity
     most: np.float32  # the largest
-    dark: np.float32  # a measurement counts where it is above this, relative to the intensity,
-    ratio: np.float32  # and above this times the pixel's mean
+    dark: Floats  # (light,): a measurement counts where it is above this,
+    ratio: np.float32  # and, relative to the intensity, above this times the pixel's mean
     condition_squared: np.float32  # largest trace(A) * trace(A^-1) of the usable lights' normal equations
     albedo_scale: np.float32
     seen: Bytes  # (light, row, col or 1), or empty
@@ -205,7 +206,7 @@ def task(
         near=_near(lit, unit, copies, rows, cols),
         least=np.float32((unit / strength).min()),
         most=np.float32((unit / strength).max()),
-        dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
+        dark=_filled(max(usable.dark_level, _NO_LIMIT) * lit.noisiness, copies, mode="edge"),
         ratio=np.float32(max(usable.shadow_ratio, _NO_LIMIT)),
         condition_squared=np.float32(max(PIXEL_CONDITION**2, 1.001 * frobenius)),
         albedo_scale=np.float32(1 / unit),

@@ -26,13 +26,16 @@ def solve_grey(task: Task, w: Floats, start: int, n: int) -> bool:
         else:
             _add_three(w, n, a, b, c, task.inverse, k, True)
     (origin_x, origin_y, origin_z), (gain, offset, ceiling, _) = task.origin, task.tone[0, 0]
-    dark, least, most = task.dark, task.least, task.ratio * task.most
+    dark, least, most = task.dark[0], task.least, task.ratio * task.most
+    for light in range(1, task.lights):
+        dark = max(dark, task.dark[light])
+    dark *= SLIGHTLY_MORE
     unusable = np.int32(0)  # as wide as the samples: twice as many fit into a vector
     for i in range(n):
         x, y, z = w[X + i] + origin_x, w[Y + i] + origin_y, w[Z + i] + origin_z
         w[X + i], w[Y + i], w[Z + i] = x, y, z
         low, high = w[LOW + i] * gain + offset, w[HIGH + i] * gain + offset
-        in_shadow = low * least <= max(dark, high * most) * SLIGHTLY_MORE
+        in_shadow = (low <= dark) | (low * least <= high * most * SLIGHTLY_MORE)
         unusable = np.int32(unusable | in_shadow | (high >= ceiling) | (not x + y + z < -MISSING))
     return bool(unusable == 0)
 

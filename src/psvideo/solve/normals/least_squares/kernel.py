@@ -102,29 +102,27 @@ def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
         for i in range(n):
             w[SUM + i] += plane[i] * at(per, i) if plane[i] > ABSENT else ZERO
             w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
-    dark, ratio = task.dark, task.ratio
+    ratio = task.ratio
     for i in range(n):
-        w[LIMIT + i] = max(dark, ratio * w[SUM + i] / (w[COUNT + i] + TINY))
-    _add_equations(w, n, m[0], m[1], m[2], task.matrix, task.per_strength, 0, False)
+        w[LIMIT + i] = ratio * w[SUM + i] / (w[COUNT + i] + TINY)
+    _add_equations(task, w, n, m[0], m[1], m[2], 0, False)
     for k in range(3, m.shape[0], 3):
-        _add_equations(w, n, m[k], m[k + 1], m[k + 2], task.matrix, task.per_strength, k, True)
+        _add_equations(task, w, n, m[k], m[k + 1], m[k + 2], k, True)
     _solve_normal_equations(w, n, task.condition_squared)
 
 
 @FUSED.inlined
-def _add_equations(
-    w: Floats, n: int, a: Floats, b: Floats, c: Floats, matrix: Floats, per_strength: Floats, k: int, begun: bool
-) -> None:
+def _add_equations(task: Task, w: Floats, n: int, a: Floats, b: Floats, c: Floats, k: int, begun: bool) -> None:
     """Add three lights, from light k, to the normal equations of every pixel where they are usable."""
-    light_a, per_a = of_light(matrix, k), per_strength[k]
-    light_b, per_b = of_light(matrix, k + 1), per_strength[k + 1]
-    light_c, per_c = of_light(matrix, k + 2), per_strength[k + 2]
+    light_a, per_a, dark_a = of_light(task.matrix, k), task.per_strength[k], task.dark[k]
+    light_b, per_b, dark_b = of_light(task.matrix, k + 1), task.per_strength[k + 1], task.dark[k + 1]
+    light_c, per_c, dark_c = of_light(task.matrix, k + 2), task.per_strength[k + 2], task.dark[k + 2]
     for i in range(n):
         (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = at(light_a, i), at(light_b, i), at(light_c, i)
         p, q, r, limit = a[i], b[i], c[i], w[LIMIT + i]
-        one_p = ONE if p * at(per_a, i) > limit else ZERO
-        one_q = ONE if q * at(per_b, i) > limit else ZERO
-        one_r = ONE if r * at(per_c, i) > limit else ZERO
+        one_p = ONE if (p > dark_a) & (p * at(per_a, i) > limit) else ZERO
+        one_q = ONE if (q > dark_b) & (q * at(per_b, i) > limit) else ZERO
+        one_r = ONE if (r > dark_c) & (r * at(per_c, i) > limit) else ZERO
         a[i] = p if one_p > ZERO else MISSING
         b[i] = q if one_q > ZERO else MISSING
         c[i] = r if one_r > ZERO else MISSING

@@ -136,18 +136,20 @@ def _solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: i
     weigh_channels(task, w, n)
     for i in range(n):
         w[SUM + i], w[LOW + i] = ZERO, -MISSING
+    unusable = np.int32(0)
     for light in range(task.lights):
         per, v, m = at(task.per_strength[light], 0), line[3 * BLOCK * light :], measurements[light]
+        dark = task.dark[light]
         for i in range(n):
             value = w[XX + i] * v[i] + w[YY + i] * v[BLOCK + i] + w[ZZ + i] * v[2 * BLOCK + i]
             m[i] = value
+            unusable = np.int32(unusable | (value <= dark))
             w[SUM + i] += value * per
             w[LOW + i] = min(w[LOW + i], value * per)
     a, b, c, d, e, f, determinant = adjugate(*_squares(task))
     one = ONE / determinant
     a, b, c, d, e, f = a * one, b * one, c * one, d * one, e * one, f * one
-    dark, share = task.dark, task.ratio / (np.float32(task.lights) + TINY)
-    unusable = np.int32(0)
+    share = task.ratio / (np.float32(task.lights) + TINY)
     for i in range(n):
         red, green, blue = w[XX + i], w[YY + i], w[ZZ + i]
         p = red * w[RX + i] + green * w[GX + i] + blue * w[BX + i]
@@ -155,7 +157,7 @@ def _solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: i
         r = red * w[RZ + i] + green * w[GZ + i] + blue * w[BZ + i]
         x, y, z = a * p + b * q + c * r, b * p + d * q + e * r, c * p + e * q + f * r
         w[X + i], w[Y + i], w[Z + i] = x, y, z
-        unusable = np.int32(unusable | (w[LOW + i] <= max(dark, share * w[SUM + i])) | (not x + y + z < -MISSING))
+        unusable = np.int32(unusable | (w[LOW + i] <= share * w[SUM + i]) | (not x + y + z < -MISSING))
     return bool(unusable == 0)
 
 

@@ -192,19 +192,21 @@ def read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col:
 
 @FUSED.inlined
 def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
-    """What is dark beside the pixel's own mean becomes MISSING; COUNT is what remains."""
-    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    """What is dark, or dark beside the pixel's own mean, becomes MISSING; COUNT is what remains, and all of that is
+    brighter than LIMIT, relative to its light."""
+    w[SUM : SUM + n], w[COUNT : COUNT + n], w[LIMIT : LIMIT + n] = ZERO, ZERO, -MISSING
     for light in range(task.lights):
-        plane, per = m[light], task.per_strength[light]
+        plane, per, dark = m[light], task.per_strength[light], task.dark[light]
         for i in range(n):
+            w[LIMIT + i] = min(w[LIMIT + i], dark * at(per, i))
             w[SUM + i] += max(plane[i] * at(per, i), ZERO) if plane[i] > ABSENT else ZERO
             w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
     for i in range(n):
-        w[LIMIT + i] = max(task.dark, task.ratio * w[SUM + i] / (w[COUNT + i] + TINY))
+        w[LIMIT + i] = max(w[LIMIT + i], task.ratio * w[SUM + i] / (w[COUNT + i] + TINY))
         w[COUNT + i] = ZERO
     for light in range(task.lights):
-        plane, per = m[light], task.per_strength[light]
+        plane, per, dark = m[light], task.per_strength[light], task.dark[light]
         for i in range(n):
-            lit = plane[i] * at(per, i) > w[LIMIT + i]
+            lit = (plane[i] > dark) & (plane[i] * at(per, i) > w[LIMIT + i])
             plane[i] = plane[i] if lit else MISSING
             w[COUNT + i] += ONE if lit else ZERO

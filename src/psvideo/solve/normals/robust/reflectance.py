@@ -100,7 +100,8 @@ def _points(
     colour = (np.maximum(each, 0) * here[..., None]).sum(axis=0) * lit.shares[: samples.shape[-1]]
     measured = (each * colour).sum(axis=-1) / np.maximum(colour.sum(axis=-1), 1e-9)
     mean = (np.maximum(measured, 0) * here).sum(axis=0) / np.maximum(here.sum(axis=0), 1)
-    least = np.maximum(usable.dark_level / lit.intensities.mean(), usable.shadow_ratio * mean)
+    dark = usable.dark_level * (lit.noisiness / lit.intensities.mean(axis=1))[:, None] / size
+    least = np.maximum(dark, usable.shadow_ratio * mean)
     towards = sent / size[..., None]
     half = towards + to_camera
     half /= np.linalg.norm(half, axis=-1, keepdims=True)

@@ -14,7 +14,7 @@ from psvideo.model.arrays import Bytes, Floats, Indices
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, ONE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.colour_kernel import solve_colours
 from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usable
-from psvideo.solve.normals.loops.near_kernel import lent_task, place_lights
+from psvideo.solve.normals.loops.near_kernel import at, lent_task, place_lights
 from psvideo.solve.normals.loops.storing import store_block
 from psvideo.solve.normals.robust.apart import Room, fill_up, memory_for_block, put_side_by_side
 from psvideo.solve.normals.robust.equations import DOUBT, fill_sent, fill_view
@@ -215,6 +215,15 @@ def _solve_apart(task: Task, sent: Floats, per: Floats, weights: Weights, room: 
 
 
 @FUSED.inlined
+def _least_lit(task: Task) -> np.float32:
+    """What every usable measurement is brighter than, relative to its light, where lights are distant."""
+    least = task.dark[0] * at(task.per_strength[0], 0)
+    for light in range(1, task.lights):
+        least = min(least, task.dark[light] * at(task.per_strength[light], 0))
+    return np.float32(least)
+
+
+@FUSED.inlined
 def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) -> bool:
     """Read a block's usable measurements; where all are, plain least squares has solved it, and True is returned."""
     w, values, m = room.planes, room.values, room.measurements
@@ -227,7 +236,7 @@ def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) 
     plain = distant and task.tone.shape[1] == 3 and all_seen(task.seen, row, col, n)
     summed = plain and solve_colours(task, w, values, m, row * task.cols + col, n)
     if summed:
-        w[COUNT : COUNT + n], w[LIMIT : LIMIT + n] = np.float32(task.lights), task.dark
+        w[COUNT : COUNT + n], w[LIMIT : LIMIT + n] = np.float32(task.lights), _least_lit(task)
     else:
         read_usable(task, w, values, m, row, col, n)
     return summed

@@ -108,6 +108,8 @@ def _balanced(given: Task) -> Task:
     tone = given.tone.copy()
     tone[: given.lights, :, :3] *= factor[..., None]
     tone[: given.lights, :, 3] /= factor
+    dark = given.dark.copy()
+    dark[: given.lights] *= factor[:, 0]
     matrix, per_strength = given.matrix.copy(), given.per_strength.copy()
     matrix[: given.lights] *= factor
     per_strength[: given.lights] /= factor[:, 0]
@@ -119,5 +121,6 @@ def _balanced(given: Task) -> Task:
         tone=np.pad(tone, ((0, more), (0, 0), (0, 0)), mode="edge"),
         matrix=np.pad(matrix, ((0, more), (0, 0))),
         per_strength=np.pad(per_strength, (0, more), mode="edge"),
+        dark=np.pad(dark, (0, more), mode="edge"),
         near=near,
     )

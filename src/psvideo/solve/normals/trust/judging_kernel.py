@@ -157,7 +157,7 @@ def indirect_rows(
                 for light in range(t.lights):
                     if not values[light * channels, i] > ABSENT:
                         continue
-                    lamp, per = of_light(t.matrix, light), t.per_strength[light]
+                    lamp, per, dark = of_light(t.matrix, light), t.per_strength[light], t.dark[light]
                     level = ZERO
                     for channel in range(channels):
                         level += values[light * channels + channel, i] * each * t.shares[channel]
@@ -165,11 +165,12 @@ def indirect_rows(
                     lx, ly, lz = at(lamp, i)
                     cosine = (lx * nx + ly * ny + lz * nz) * one
                     level *= one * t.albedo_scale
+                    dark *= one * t.albedo_scale
                     beyond = level / size - max(cosine, ZERO)
                     left += beyond * beyond
-                    showing += ONE if max(level, size * cosine) > t.dark * t.albedo_scale else ZERO
+                    showing += ONE if max(level, size * cosine) > dark else ZERO
                     shadowed = (cosine > facing) & (level < SHADOWED * size * cosine)
-                    if shadowed | (cosine <= facing) | (level < t.dark * t.albedo_scale):  # or lost in noise
+                    if shadowed | (cosine <= facing) | (level < dark):  # or lost in noise
                         grazing = ZERO if shadowed else max(cosine, ZERO)
                         share = level / size - grazing
                         sum_of += min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
