@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Doubles, Image
+from psvideo.model.arrays import Bytes, Doubles, Image
 from psvideo.plates.mixing.mixture import Mixture
 
 
@@ -19,6 +19,8 @@ class LightPlate:
     is so bright at least, or ``unmixed``: a difference of flashes, of which one was clipped, and may be anything.
     ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
     show ``time_s``. ``sideways`` is a picture that was turned by a quarter: the sensor's rows are its columns.
+    ``filled`` (row, col) is what ``clipped_flashes`` said of an ``unmixed`` plate before it was turned or given rows
+    of others, which leaves nothing of its flashes; None while its picture still holds them.
     """
 
     light: str
@@ -30,6 +32,7 @@ class LightPlate:
     unmixed: bool = False
     shown_s: Doubles | None = None
     sideways: bool = False
+    filled: Bytes | None = None
 
     @property
     def image(self) -> Image:

@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Doubles, Flags
+from psvideo.model.arrays import Bytes, Doubles, Flags
 from psvideo.model.camera import Camera
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.plates.several_lights.clipped_flashes import with_filled
 
 LATER, MOST_LATER = 2, 8
 """A plate waits for later ones of its light: for two where earlier ones showed what it lacks, for eight at a clip's
@@ -62,6 +63,7 @@ class _Waiting:
     @classmethod
     def of(cls, plate: LightPlate) -> "_Waiting":
         """Hold a plate."""
+        plate = with_filled(plate)
         if plate.rows_seen.all():
             return cls(plate=plate, rows=None, shape=plate.shape)
         rows = plate.picture.rows(np.flatnonzero(plate.rows_seen))
@@ -111,13 +113,19 @@ def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPl
     if own.rows_seen.all():
         return own
     found = known[own.light]
-    image, shown_s, seen = found.image.copy(), found.flashed_s.copy(), found.rows_seen.copy()
+    image, shown_s, seen, full = found.image.copy(), found.flashed_s.copy(), found.rows_seen.copy(), found.filled
     for one in later:
         nearer = ~seen | (abs(one.plate.time_s - own.time_s) < np.abs(shown_s - own.time_s))
         wanted = one.plate.rows_seen & ~own.rows_seen & nearer
         one.put(image, wanted)
         shown_s[wanted], seen[wanted] = one.plate.time_s, True
-    return replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s)
+        full = _full_of(full, one.plate.filled, wanted)
+    return replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s, filled=full)
+
+
+def _full_of(own: Bytes | None, other: Bytes | None, rows: Flags) -> Bytes | None:
+    """Return what is filled of a plate with some rows of another."""
+    return None if own is None or other is None else np.where(rows[:, None], other, own)
 
 
 def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
@@ -127,4 +135,5 @@ def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
     image = np.array(plate.image)
     image[rows] = other.image[rows]
     shown_s: Doubles = np.where(rows, other.flashed_s, plate.flashed_s)
-    return replace(plate, picture=mixture_of(image), seen=plate.rows_seen | rows, shown_s=shown_s)
+    full = _full_of(plate.filled, other.filled, rows)
+    return replace(plate, picture=mixture_of(image), seen=plate.rows_seen | rows, shown_s=shown_s, filled=full)

@@ -14,6 +14,7 @@ from psvideo.plates.align.packed import packed
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.plates.several_lights.clipped_flashes import with_filled
 
 
 def upright(plate: LightPlate, turn: Turn) -> LightPlate:
@@ -21,8 +22,15 @@ def upright(plate: LightPlate, turn: Turn) -> LightPlate:
     if turn.is_none:
         return plate
     picture = packed(mixture_of(turn.upright(plate.image)), plate.saturation)
-    sideways = plate.sideways != turn.transposed
-    return replace(plate, picture=picture, seen=_seen(plate, turn), shown_s=_shown_s(plate, turn), sideways=sideways)
+    filled = with_filled(plate).filled
+    return replace(
+        plate,
+        picture=picture,
+        seen=_seen(plate, turn),
+        shown_s=_shown_s(plate, turn),
+        sideways=plate.sideways != turn.transposed,
+        filled=None if filled is None else turn.upright(np.array(filled)),
+    )
 
 
 def upright_window(found: Separated, turn: Turn) -> Separated:

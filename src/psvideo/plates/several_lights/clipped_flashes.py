@@ -24,11 +24,22 @@ def filled_of(plate: LightPlate, rows: range) -> Bytes | None:
     (row, col); None where every value is light."""
     if not plate.unmixed:
         return None
+    if plate.filled is not None:
+        some = plate.filled[rows.start : rows.stop : rows.step]
+        return some if some.any() else None
     lower = replace(plate.picture, clips_from=NEARLY_CLIPPED * plate.picture.clips_from)
     nearly = _at_ceiling(replace(plate, picture=lower), rows)
     if not nearly.any():
         return None
     return np.where(_at_ceiling(plate, rows), FULL, np.where(nearly, NEARLY_FULL, 0)).astype(np.uint8)
+
+
+def with_filled(plate: LightPlate) -> LightPlate:
+    """Return a plate that carries what is filled of it, as it must before it gets another picture."""
+    if not plate.unmixed or plate.filled is not None:
+        return plate
+    filled = filled_of(plate, range(plate.shape[0]))
+    return replace(plate, filled=np.broadcast_to(np.uint8(0), plate.shape[:2]) if filled is None else filled)
 
 
 def vague_between(before: Bytes | None, after: Bytes | None) -> NDArray[np.bool_] | None:
