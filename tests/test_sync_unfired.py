@@ -15,7 +15,7 @@ from psvideo.sync.flashes_seen import flashes_of_fit
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import window_frames
-from psvideo.sync.unfired import incomplete, unfired_of
+from psvideo.sync.unfired import around, incomplete, unfired_of
 from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -177,6 +177,18 @@ def test_where_a_strobe_began_or_stopped_no_flash_beyond_is_complete(
     assert len(dark) >= 3
     assert not any(flash.complete for flash in dark)
     assert sum(flash.complete for flash in lit) >= len(lit) - len(dark) - 2
+
+
+def test_light_goes_on_where_it_does_on_either_side_or_among_most_of_the_nearest() -> None:
+    dark, unknown = -1e-3, np.nan
+    three = around(np.array([1.0, 1.0, dark, dark, dark, 1.0, 1.0]), 3)
+    assert three[2:5].tolist() == [1.0, 1.0, 1.0]
+    left = around(np.array([1.0, 1.0, 1.0, dark, dark, dark, dark, dark]), 3)
+    assert left[3:].max() <= 0.5
+    first = around(np.array([unknown, dark, dark, 1.0, 1.0, 1.0]), 3)
+    assert first[1:3].tolist() == [1.0, 1.0]
+    assert around(np.full(5, dark), 3).max() <= 1e-9
+    assert around(np.full(5, unknown), 3).max() <= 1e-9
 
 
 def test_a_subject_that_leaves_takes_the_light_of_all_and_no_flash_is_missing(plan: Plan) -> None:

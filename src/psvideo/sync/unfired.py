@@ -125,15 +125,15 @@ def _unfired(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> tuple[Mask, Ma
             share[slot == one] = levels.value[slot == one] / level
             error[slot == one] = levels.error[slot == one] / level
     known = np.where([flash.complete for flash in lit], share, np.nan)
-    around = _around(known, max(AROUND, len(plan.lit_slots)))
+    goes_on = around(known, max(AROUND, len(plan.lit_slots)))
     fires, gives = share > GOES_ON, share > NONE
-    share, error = share / around, error / around
-    off = (share < NONE) & (around > GOES_ON) & (share + SURE * error < GOES_ON)
+    share, error = share / goes_on, error / goes_on
+    off = (share < NONE) & (goes_on > GOES_ON) & (share + SURE * error < GOES_ON)
     for one in plan.lit_slots:
-        fired = share[(slot == one) & (share > GOES_ON) & (around > GOES_ON)]
+        fired = share[(slot == one) & (share > GOES_ON) & (goes_on > GOES_ON)]
         scatter = 1.4826 * float(np.median(np.abs(fired - np.median(fired)))) if len(fired) >= LEAST_FIRED else np.inf
         off &= (slot != one) | (1 - share > SURE * scatter)
-    return off, np.isfinite(share) & (fires | (around > GOES_ON)), gives
+    return off, np.isfinite(share) & (fires | (goes_on > GOES_ON)), gives
 
 
 def _usual(level: Doubles) -> float:
@@ -144,7 +144,7 @@ def _usual(level: Doubles) -> float:
     return float(np.median(known[known >= GOES_ON * np.percentile(known, 95)], keepdims=True)[0])
 
 
-def _around(share: Doubles, reach: int) -> Doubles:
+def around(share: Doubles, reach: int) -> Doubles:
     """Return what flashes that fired give of their own light just before and after each one, shape (flash,).
 
     A ``share`` (flash,) is NaN where it is not known. Light goes on where most of the nearest flashes give it, or where
@@ -154,6 +154,7 @@ def _around(share: Doubles, reach: int) -> Doubles:
     beside = np.array([n for n in range(-reach, reach + 1) if n])
     at = np.arange(len(share))[:, None] + beside
     near = np.where((at >= 0) & (at < len(share)), share[np.clip(at, 0, len(share) - 1)], np.nan)
+    near = np.maximum(near, 0.0)
     near[np.isnan(near[:, np.abs(beside) <= AROUND]).all(axis=1)] = 0.0
     sides = [np.fmax.reduce(near[:, side], axis=1) for side in (beside < 0, beside > 0)]
     goes_on = np.fmax(np.nanmedian(near[:, np.abs(beside) <= AROUND], axis=1), np.minimum(*sides))
