@@ -101,6 +101,15 @@ def test_the_command_says_how_things_stand_and_ends_with_a_summary(
     assert lines[-1]["frames"] == 90
     assert lines[-1]["lost"] == 0
     assert lines[-1]["results"] > 4
+    assert lines[0]["fps"] * lines[0]["at_s"] == pytest.approx(90, rel=0.01), "as fast as it went"
+    assert lines[0]["results_per_s"] * lines[0]["at_s"] == pytest.approx(lines[0]["results"], rel=0.01)
+
+
+def test_a_timing_that_cannot_be_written_is_refused_before_a_frame_is_taken(clip: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ps.PsvideoError, match="cannot be written"):
+        live(clip, timing_out=tmp_path / "file" / "timing.json", said=lambda status: pytest.fail("it ran"))
+    assert not list((tmp_path).glob(".*"))
 
 
 def test_a_clip_without_the_plans_strobe_ends_in_one_paragraph(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -204,7 +204,7 @@ def test_what_cannot_be_held_is_refused_in_one_paragraph(make_plan: PlanMaker) -
         check_holds(make_plan())
     with pytest.raises(UsageError, match="shutter"):
         check_holds(replace(plan, camera=replace(plan.camera, exposure_s=0.01)))
-    for wanted in ("72", "30-20", "top", "-4", "3-80"):
+    for wanted in ("72", "30-20", "top", "-4", "3-80", "\u00b2", "3-\u00b2"):
         with pytest.raises(UsageError, match="rows are 0 to 71"):
             target_of(plan.camera, wanted)
 

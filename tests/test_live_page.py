@@ -202,6 +202,15 @@ def test_another_host_needs_the_token() -> None:
         page.close()
 
 
+@pytest.mark.parametrize("token", ["a+b c", "schl\u00fcssel", "50%&x=1#?/"])
+def test_the_address_that_is_printed_opens_the_page_whatever_the_token_holds(token: str) -> None:
+    page = live_page(NewestPictures(), dict, host="0.0.0.0", port=0, token=token)
+    try:
+        assert fetched(page.url.replace("0.0.0.0", "127.0.0.1"))[0] == 200
+    finally:
+        page.close()
+
+
 def test_a_port_that_is_taken_is_named(served: Served) -> None:
     port = int(served[0].url.rstrip("/").rpartition(":")[2])
     with pytest.raises(UsageError, match=f"`port` {port}: cannot be used"):

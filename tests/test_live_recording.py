@@ -17,6 +17,7 @@ from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import UsageError
 from psvideo.export.sequences import code_files
+from psvideo.export.sequences.code_files import write_codes
 from psvideo.live.chain import LiveFrame
 from psvideo.live.incoming import recording
 from psvideo.live.incoming.recording import Recording
@@ -105,6 +106,24 @@ def test_a_disk_that_is_too_slow_ends_the_recording_without_a_hole(tmp_path: Pat
     record.write()
     assert record.written == 10
     assert "too slow for this camera: recording ended after 10 frames" in record.ended
+
+
+def test_what_is_cut_while_a_frame_is_written_takes_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second Ctrl-C comes while a frame is being written, and the source gives another before it hears of it."""
+    record = recording.Recording(folder=tmp_path / "rec")
+    (tmp_path / "rec" / "frames").mkdir(parents=True)
+    frames = [LiveFrame(index=n, coded=Coded(codes=np.zeros((8, 8), np.uint8)), came_s=0.0) for n in range(2)]
+    whole = write_codes
+
+    def cut_meanwhile(path: Path, codes: np.ndarray) -> None:
+        record.cut()
+        record.take(frames[1])
+        whole(path, codes)
+
+    monkeypatch.setattr(recording, "write_codes", cut_meanwhile)
+    record.take(frames[0])
+    record.write()
+    assert (record.written, record._bytes, len(record._queue)) == (1, 0, 0)
 
 
 def test_the_log_of_a_strobe_that_was_played_meanwhile_lies_in_the_recording(clip: Path, tmp_path: Path) -> None:

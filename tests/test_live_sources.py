@@ -1,6 +1,7 @@
 """Where live frames come from: a pipe, the network, a folder that grows; and what goes wrong with each."""
 
 import io
+import itertools
 import json
 import shutil
 import socket
@@ -20,8 +21,10 @@ from psvideo.cli.app import main
 from psvideo.clip import read_frames
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.record import Header
-from psvideo.clip.streams.growing_folder import read_growing
+from psvideo.clip.streams.growing_folder import _new_files, read_growing
 from psvideo.clip.streams.stream import StreamPlaces, read_stream
+from psvideo.live.chain import Chain
+from psvideo.live.incoming.sources import opened_source
 
 Pictures = list[np.ndarray]
 
@@ -229,6 +232,37 @@ def test_frames_that_a_recorder_writes_out_of_order_are_read_in_order_and_none_i
     found = [frame.index for frame in read_growing(tmp_path, take.plan.camera, quiet_s=0.6)]
     writer.join()
     assert found == list(range(12))
+
+
+def test_frames_that_grow_are_called_by_their_files_numbers(clip: Path, tmp_path: Path) -> None:
+    files = sorted((clip / "frames").iterdir())[:3]
+    for number, file in zip((1001, 1002, 1004), files, strict=True):
+        shutil.copyfile(file, tmp_path / f"take.{number}{file.suffix}")
+    source = opened_source(str(tmp_path), plan=clip / "plan.toml", growing=True)
+    found = list(itertools.islice(source.frames(), 3))
+    assert [(frame.index, frame.number) for frame in found] == [(0, 1001), (1, 1002), (3, 1004)]
+    chain = Chain(plan=source.plan)
+    for frame in found:
+        chain.take(frame)
+    assert chain.first_number == 1001
+
+
+def test_two_files_of_one_number_are_both_named(clip: Path, tmp_path: Path) -> None:
+    file = next((clip / "frames").iterdir())
+    for name in ("a.0001", "b.0001"):
+        shutil.copyfile(file, tmp_path / f"{name}{file.suffix}")
+    with pytest.raises(ps.PsvideoError, match=r"a\.0001.*b\.0001.*are both numbered 1"):
+        list(read_growing(tmp_path, ps.open_take(clip).plan.camera, quiet_s=0.2))
+
+
+def test_a_folder_of_many_frames_is_looked_through_once(clip: Path, tmp_path: Path) -> None:
+    suffix = next((clip / "frames").iterdir()).suffix
+    for number in range(5000):
+        (tmp_path / f"take.{number:05d}{suffix}").touch()
+    passed: dict[Path, set[str]] = {}
+    assert _new_files(tmp_path, 4998, passed) == [(4999, tmp_path / f"take.04999{suffix}")]
+    assert len(passed[tmp_path]) == 4999
+    assert _new_files(tmp_path, 4999, passed) == []
 
 
 def test_a_recorder_that_numbers_by_twos_is_waited_for_once_and_not_at_each_frame(clip: Path, tmp_path: Path) -> None:

@@ -21,19 +21,40 @@ def whole_file(path: Path) -> Iterator[Path]:
 
     A full disk or a folder that cannot be written becomes a PsvideoError that names the file.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}-{HERE}.partial")
+    beside = _beside(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield beside
         beside.replace(path)
     except OSError as fault:
-        raise PsvideoError(
-            f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
-            "check the folder's permissions, then run the command again."
-        ) from fault
+        raise _not_written(path, fault) from fault
     finally:
         with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
+
+
+def check_can_be_written(path: Path) -> None:
+    """Raise PsvideoError where a file could not be written, long before there is what to write; nothing is left."""
+    there = path
+    while not there.parent.exists():
+        there = there.parent
+    beside = _beside(there)
+    try:
+        beside.touch()
+        beside.unlink()
+    except OSError as fault:
+        raise _not_written(path, fault) from fault
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name}.{os.getpid()}-{HERE}.partial")
+
+
+def _not_written(path: Path, fault: OSError) -> PsvideoError:
+    return PsvideoError(
+        f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
+        "check the folder's permissions, then run the command again."
+    )
 
 
 def write_text(path: Path, text: str) -> None:

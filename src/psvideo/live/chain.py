@@ -41,11 +41,15 @@ Search = Callable[[Callable[[], None]], None]
 
 @dataclass(frozen=True, kw_only=True)
 class LiveFrame:
-    """A frame as a source gives it: its place in time by the source's numbers, and when it came, by this machine."""
+    """A frame as a source gives it: its place in time by the source's numbers, and when it came, by this machine.
+
+    ``number`` is what its file is called by, where it has a file whose number nobody knew before.
+    """
 
     index: int
     coded: Coded
     came_s: float
+    number: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +86,8 @@ class Chain:
     """What happens to every frame, and what is made of the newest. ``take`` and ``solve`` may run in two threads.
 
     ``lost_frames`` counts frames that never came, by the source's numbers or by the picture; ``gaps`` are those of the
-    numbers, by the last place before each. ``why`` says why no strobe was found the last time that one
+    numbers, by the last place before each, and ``first_number`` the first frame's, where it has one of its own.
+    ``why`` says why no strobe was found the last time that one
     was looked for; ``fault`` is what went wrong in looking.
     """
 
@@ -94,6 +99,7 @@ class Chain:
     search: Search = search_here
     seen: int = 0
     lost_frames: int = 0
+    first_number: int | None = None
     why: str = ""
     fault: Exception | None = None
     gaps: dict[int, int] = field(default_factory=dict)
@@ -121,6 +127,8 @@ class Chain:
         doubt = LOST * clipped if clipped.any() else None
         small = Smaller(step=self.step, cfa=self.cfa).of(frame.coded)
         with self._guard:
+            if not self.seen:
+                self.first_number = frame.number
             self._count(frame.index)
             self._pending.append((frame.index, mean, doubt))
             while len(self._pending) > 1 and self._too_old(self._pending[0][0]):

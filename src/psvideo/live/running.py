@@ -113,7 +113,8 @@ class Running:
                 self.meanwhile(newest, inf)
             if self._stop.is_set() or self._over(frame.index):
                 break
-        self.said(self._status(time.monotonic() - began_s, 1.0, (0, 0)))
+        took_s = time.monotonic() - began_s
+        self.said(self._status(took_s, took_s, (0, 0)))
 
     def _get_ready(self, began_s: float) -> None:
         """Rehearse, and say how far that is."""

@@ -12,7 +12,7 @@ from psvideo.formats.rig_toml import SCHEMA as RIG
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
-from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
+from psvideo.formats.whole_files import check_can_be_written, check_ending, refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.followed_timing import followed_timing
@@ -108,6 +108,7 @@ def live(
     timing_path = path_if_given("timing_out", timing_out)
     if timing_path is not None:
         refuse_existing(timing_path, force=force, mark=TIMING)
+        check_can_be_written(timing_path)
     if known is not None:
         with said_of(rig):
             _check_rig(known, played)
@@ -140,7 +141,8 @@ def live(
         whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
         raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
     if timing_path is not None:
-        name, first = played.name, played.first_number
+        named = running.chain.first_number
+        name, first = played.name, played.first_number if named is None else named
         if record_path is not None:
             name, first = record_path.resolve().name, FIRST_NUMBER
         write_text(timing_path, format_timing(followed_timing(running.chain, clip=name, first_number=first)))

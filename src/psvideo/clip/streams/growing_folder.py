@@ -1,5 +1,6 @@
 """A folder that a recorder is still writing: its frames in the order of their numbers, as soon as each is whole."""
 
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +19,8 @@ LOOK_S = 0.004
 """Between two looks into the folder."""
 WHOLE_S = 2.0
 """A file that cannot be decoded for this long is damaged, and not merely still being written."""
+LOOKS = 0.25
+"""Looking takes no more than this share of the time in which nothing new comes: folders hold tens of thousands."""
 LATE_S = 0.25
 """A number that is left out is waited for so long after a later one came: recorders write with several threads."""
 QUIET_S = 10.0
@@ -33,10 +36,13 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
     if not folder.is_dir():
         raise PsvideoError(f"{folder}: there is no such folder. Name the one that the recorder writes into.")
     done, first, look = -1, None, ""
+    passed: dict[Path, set[str]] = {}
     seen_s: dict[int, float] = {}
     heard_s = time.monotonic()
     while time.monotonic() - heard_s < quiet_s:
-        new, before = _new_files(folder, done), done
+        looked_s = time.monotonic()
+        new, before = _new_files(folder, done, passed), done
+        took_s = time.monotonic() - looked_s
         seen_s |= {number: time.monotonic() for number, _ in new if number not in seen_s}
         for number, file in new:
             if first is not None and number > done + 1 and time.monotonic() - seen_s[number] < LATE_S:
@@ -56,7 +62,7 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
         if done > before:
             heard_s = time.monotonic()
         else:
-            time.sleep(LOOK_S)
+            time.sleep(max(LOOK_S, took_s * (1 / LOOKS - 1)))
     if first is None:
         raise PsvideoError(
             f"{folder}: no frame appeared in {quiet_s:g} s; expected numbered images ({', '.join(sorted(KINDS)[:6])}, "
@@ -64,17 +70,31 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
         )
 
 
-def _new_files(folder: Path, after: int) -> list[tuple[int, Path]]:
-    """Return the numbered images beyond a number, in order; hidden files are not yet whole."""
+def _new_files(folder: Path, after: int, passed: dict[Path, set[str]]) -> list[tuple[int, Path]]:
+    """Return the numbered images beyond a number, in order; hidden files are not yet whole.
+
+    ``passed`` names what was looked at before and is none of them. Raises PsvideoError where two have one number.
+    """
     places = (folder / FRAMES, folder) if (folder / FRAMES).is_dir() else (folder,)
-    found = [
-        (number, file)
-        for place in places
-        for file in place.iterdir()
-        if file.suffix.lower() in KINDS and not file.name.startswith(".")
-        if (number := number_of(file)) is not None and number > after
-    ]
-    return sorted(found)
+    found: dict[int, Path] = {}
+    for place in places:
+        known = passed.setdefault(place, set())
+        for name in sorted(set(os.listdir(place)) - known):  # noqa: PTH208  # a path for each would take 20 times as long
+            number = None if name.startswith(".") else _image_number(Path(name))
+            if number is None or number <= after:
+                known.add(name)
+                continue
+            if number in found:
+                raise PsvideoError(
+                    f"{found[number]} and {place / name}: are both numbered {number}, so which is the frame is not "
+                    "known. Let the recorder write one kind of file, and each take into a folder of its own."
+                )
+            found[number] = place / name
+    return sorted(found.items())
+
+
+def _image_number(file: Path) -> int | None:
+    return number_of(file) if file.suffix.lower() in KINDS else None
 
 
 def _whole(file: Path) -> CodedPicture | PictureInFile:

@@ -73,7 +73,11 @@ def target_of(camera: Camera, wanted: str) -> WantedRow:
     if wanted == "edge":
         return WantedRow(row=_opened(camera, 0.5 * (camera.height_px + around)) if around > camera.height_px else 0.0)
     first, dash, last = wanted.partition("-")
-    if not first.isdigit() or (dash and not last.isdigit()) or not int(first) <= int(last or first) < camera.height_px:
+    if (
+        not first.isdecimal()
+        or (dash and not last.isdecimal())
+        or not int(first) <= int(last or first) < camera.height_px
+    ):
         raise UsageError(
             f'`lock` {wanted}: expected "edge", the row at which the dark row shall stand, or the rows to keep it away '
             f"from, such as {camera.height_px // 4}-{3 * camera.height_px // 4}; rows are 0 to {camera.height_px - 1}."

@@ -65,7 +65,7 @@ class Recording:
                     f"{self.written + len(self._queue)} frames, which are whole. Record to a faster disk, or film "
                     "fewer rows or frames a second."
                 )
-            if not self.ended:
+            if not self.ended and not self._over:
                 self._queue.append((frame.index, codes))
                 self._bytes += codes.nbytes
                 self._changed.notify_all()
@@ -84,7 +84,7 @@ class Recording:
                 self._give_up(index, fault)
                 return
             with self._changed:
-                if self._queue:  # nobody cut it meanwhile
+                if self._queue and self._queue[0][1] is codes:  # nobody cut it meanwhile
                     self._queue.popleft()
                     self._bytes -= codes.nbytes
                 self.written += 1

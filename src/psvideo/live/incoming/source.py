@@ -26,8 +26,9 @@ class LiveSource:
     """A source of frames. ``frames`` gives them, each with its place in time by the source's own count or time stamps.
 
     ``kind`` is a few pixels as its frames are likely to be coded.
-    ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
-    mosaic. ``channels`` is how many its pictures have once they are demosaiced, None where only its frames will tell.
+    ``first_number`` is what the first frame is called by, where it does not say so itself. ``cfa`` is the filter
+    pattern of a mosaic. ``channels`` is how many its pictures have once they are demosaiced, None where only its frames
+    will tell.
     ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
     when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it, ``notes``
     what happened to it on the way; ``check`` what to look at where no frames come.

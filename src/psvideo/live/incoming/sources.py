@@ -30,7 +30,7 @@ def opened_source(
     Raises UsageError where what is needed for it was not given.
     """
     if growing:
-        found = _live(source, plan, lambda camera_plan: read_growing(Path(source), camera_plan.camera))
+        found = _live(source, plan, lambda one: read_growing(Path(source), one.camera), files=True)
         return replace(found, check="that the recorder still writes its frames into this folder")
     if is_genicam(source):
         notes: list[str] = []
@@ -48,7 +48,10 @@ def opened_source(
     return played_clip(open_clip(Path(source), plan=plan), pace=pace)
 
 
-def _live(source: str, plan: Path | None, read: Callable[[Plan], Iterable[Frame]]) -> LiveSource:
+def _live(
+    source: str, plan: Path | None, read: Callable[[Plan], Iterable[Frame]], *, files: bool = False
+) -> LiveSource:
+    """Return a source of frames that come as they are taken; ``files``: each is a file of its own, with a number."""
     if plan is None:
         raise UsageError(
             f"{source}: nothing lies beside frames that come as they are taken, so the plan must be named: `plan`."
@@ -57,7 +60,8 @@ def _live(source: str, plan: Path | None, read: Callable[[Plan], Iterable[Frame]
 
     def frames() -> Iterator[LiveFrame]:
         for frame in read(planned):
-            yield LiveFrame(index=frame.index, coded=frame.coded, came_s=time.monotonic())
+            number = frame.number if files else None
+            yield LiveFrame(index=frame.index, coded=frame.coded, came_s=time.monotonic(), number=number)
 
     name = "standard input" if source == STANDARD_INPUT else source
     camera = planned.camera

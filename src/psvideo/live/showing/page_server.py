@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from http import HTTPStatus
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.live.showing.newest_pictures import NewestPictures
@@ -54,7 +54,7 @@ class LivePage:
     @property
     def url(self) -> str:
         """The address to open in a browser, with the token where one is needed."""
-        query = f"?token={self.token}" if self.token else ""
+        query = f"?token={quote(self.token, safe='')}" if self.token else ""
         return f"http://{self.host}:{self._port}/{query}"
 
     @property
