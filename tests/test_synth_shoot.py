@@ -140,7 +140,7 @@ def test_footage_of_every_kind_reads_back_as_the_light_that_fell(
 def test_a_clip_lies_as_a_camera_would_leave_it_and_the_truth_fits(tmp_path: Path) -> None:
     clip = film(tmp_path, output__dropped=[3], output__first_number=118)
     scene = read_scene(tmp_path / "scene.toml")
-    assert sorted(path.name for path in clip.iterdir()) == ["frames", "plan.toml", "rig.toml", "truth"]
+    assert sorted(path.name for path in clip.iterdir()) == [".written", "frames", "plan.toml", "rig.toml", "truth"]
     numbers = [118, 119, 120, 122, 123, 124, 125]
     assert sorted(path.name for path in (clip / "frames").iterdir()) == [f"ball.{n:04d}.png" for n in numbers]
     plan, rig = read_plan(clip / "plan.toml"), read_rig(clip / "rig.toml")
@@ -274,11 +274,13 @@ def test_an_existing_clip_is_replaced_only_by_force(tmp_path: Path, capsys: pyte
     with pytest.raises(UsageError, match="exists already"):
         shoot(tmp_path / "scene.toml", clip)
     assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip)]) == 2
+    assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "--force"]) == 2
+    assert "mine.txt" in capsys.readouterr().err
     assert (clip / "mine.txt").read_text() == "precious"
+    (clip / "mine.txt").unlink()
     assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "--force", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["frames"], said["path"]) == (8, str(clip))
-    assert not (clip / "mine.txt").exists()
 
 
 def test_footage_is_never_replaced_by_a_virtual_clip(tmp_path: Path) -> None:
