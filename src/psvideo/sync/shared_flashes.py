@@ -107,7 +107,7 @@ def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted
             f"{names}: the strobe repeats itself every {first.plan.cycle_s:.4g} s, so which flashes they share is not "
             f"certain: if both ran at the same time, {take.timing.clip} may have begun {choices}{more} s after "
             f"{first.timing.clip}; if not, they share none. Say roughly when each clip began, in seconds of any clock "
-            "(`starts_s`), or plan with a longer code (`marker` coded)."
+            f"(`starts_s`), or {_told_apart(first.plan)}."
         )
     if wanted_s is not None and possible:
         possible = [_nearest(first, take, possible, wanted_s)]
@@ -120,6 +120,13 @@ def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted
             "recorded at the same time as the first one."
         )
     return possible[0]
+
+
+def _told_apart(plan: Plan) -> str:
+    """Say what makes cycles differ in a plan that is shot anew."""
+    if plan.dark_code:
+        return "record longer clips, or fewer lights, for which boards hold a longer code than this plan's"
+    return "plan with a code (`marker` coded)"
 
 
 def _nearest(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted_s: float) -> int:
@@ -142,7 +149,7 @@ def _nearest(first: CameraTake, take: CameraTake, possible: Sequence[int], wante
     if len(possible) > 1 and abs(nearest_s - wanted_s) > NEAR * cycle_s:
         raise UsageError(
             f"{said}, and the nearest that the flashes allow is {nearest_s:+.3f} s; with a cycle of {cycle_s:.4g} s "
-            "that decides nothing. Give starts that are right to a fifth of a cycle, or plan with a longer code."
+            f"that decides nothing. Give starts that are right to a fifth of a cycle, or {_told_apart(first.plan)}."
         )
     return number
 
