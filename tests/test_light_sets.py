@@ -13,6 +13,7 @@ from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean
 from psvideo.cli.app import main
 from psvideo.clip.stills import look_at
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.whole_files import marked_png
 from psvideo.runs.photographs.light_sets import Reading, open_light_sets, read_images
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
@@ -337,3 +338,10 @@ def test_numbers_in_names_may_be_written_in_any_way(tmp_path: Path) -> None:
     for name in ("L²", "L10", "L9"):
         still(tmp_path / name / "1.png", 0.5)
     assert set(read_images(tmp_path).names) == {"L²", "L10", "L9"}
+
+
+def test_a_picture_that_a_calibration_drew_beside_its_rig_is_no_photograph(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        still(tmp_path / f"{name}.png", 0.3)
+    (tmp_path / "rig.png").write_bytes(marked_png((tmp_path / "a.png").read_bytes()))
+    assert mean_pictures(tmp_path).names == ("a", "b", "c")

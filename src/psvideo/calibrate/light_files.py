@@ -12,6 +12,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name
 from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
 from psvideo.formats.timing_json import read_timing
+from psvideo.formats.whole_files import is_drawn
 
 TIMING = "timing.json"
 FEWEST_TO_ONE = 4
@@ -109,12 +110,12 @@ def _instead(folder: Path) -> str:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """Return a folder's image files, ``L2`` before ``L10``."""
+    """Return a folder's image files, ``L2`` before ``L10``, without those that psvideo drew (``rig.png``)."""
     try:
-        entries = list(folder.iterdir())
+        entries = [entry for entry in folder.iterdir() if entry.suffix.lower() in KINDS and entry.name[0] != "."]
+        files = [entry for entry in entries if entry.is_file() and not is_drawn(entry)]
     except OSError as fault:
         raise PsvideoError(f"{folder}: cannot be read ({fault.strerror or fault}). Check its name.") from fault
-    files = [entry for entry in entries if entry.suffix.lower() in KINDS and entry.name[0] != "." and entry.is_file()]
     return sorted(files, key=lambda file: _natural(file.name))
 
 

@@ -77,6 +77,11 @@ def marked_png(data: bytes) -> bytes:
     return data[:_PNG_HEAD_BYTES] + chunk + data[_PNG_HEAD_BYTES:]
 
 
+def is_drawn(path: Path) -> bool:
+    """Return whether a picture is one that a command drew, such as ``rig.png`` beside a rig, and no photograph."""
+    return path.suffix.lower() == ".png" and PICTURE_MARK.encode() in _beginning(path)
+
+
 def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:
     """Raise UsageError where an output exists already and ``force`` does not allow to replace it; what earlier runs
     that were killed left beside it is removed.
