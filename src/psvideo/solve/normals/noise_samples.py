@@ -86,7 +86,7 @@ def noise_samples(
         """Return lines that lie ``px`` apart, three by three, (channel, 3, line, col)."""
         part = rows_of(plate, (firsts + px * np.arange(3)[:, None]).ravel()) - np.float32(black_level)
         part *= np.float32(scale)
-        return np.moveaxis(part.reshape(3, len(firsts), cols, -1), -1, 0)
+        return np.moveaxis(part.reshape(3, len(firsts), cols, *plate.shape[2:] or (1,)), -1, 0)
 
     def of_mean(channels: NDArray[np.floating], px: int, each: int) -> Differences:
         blurred, gaps = zip(*(_blurred(channel, rng) for channel in channels), strict=True)
