@@ -126,6 +126,12 @@ def test_every_board_plays_the_plan_of_a_fast_camera_whose_cycle_is_as_long_as_i
         planned(**fast, dark_every=most + 1)
 
 
+@pytest.mark.parametrize("dark", ["30s", "1e300s"])
+def test_a_cycle_that_no_board_plays_is_refused(dark: str) -> None:
+    with pytest.raises(UsageError, match=r"no board plays more than 60 s\. Give a shorter `dark_s`"):
+        planned(dark=dark)
+
+
 @pytest.mark.parametrize(("dark_slot", "most"), [(None, 38), ("0.4s", 38), ("0.001ms", 38)])
 def test_a_cycle_that_is_advised_is_played_with_its_dark_slot(dark_slot: str | None, most: int) -> None:
     slow = {"fps": "2", "readout": "300ms", "flash": "10ms", "dark_slot": dark_slot}

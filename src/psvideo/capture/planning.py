@@ -45,6 +45,7 @@ def plan_shoot(request: ShootRequest) -> Shoot:
         flash_s = dict.fromkeys(request.lights, bound.flash_s)
         chosen = f"{show_seconds(bound.flash_s)}, decided by {bound.why}"
     plan = make_plan(request, flash_s)
+    _refuse_slow(plan)
     figures = shoot_figures(plan, speed_px_s=request.limits.speed_px_s)
     cautions = request_cautions(request) + shoot_cautions(plan, figures, limits=request.limits)
     return Shoot(plan=plan, figures=figures, cautions=cautions, chosen=chosen)
@@ -95,6 +96,14 @@ def _refuse_long_cycle(dark_every: int, most: int, *, lights: int, cycle_s: floa
             f"`dark_every` {dark_every}: the cycle would be {dark_every * lights + 1} flashes in "
             f"{cycle_s:.3g} s, and boards hold {BOARD_STEPS} flashes and play {MOST_CYCLE_S:.0f} s at "
             f"most. Give {most}{' or fewer' if most > 1 else ''}."
+        )
+
+
+def _refuse_slow(plan: Plan) -> None:
+    if plan.mode != "synced" and plan.cycle_s > MOST_CYCLE_S:
+        raise UsageError(
+            f"The cycle would be {plan.cycle_s:.3g} s long, and no board plays more than {MOST_CYCLE_S:.0f} s. Give a "
+            "shorter `dark_s`, shorter flashes, or fewer lights."
         )
 
 
