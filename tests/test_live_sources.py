@@ -7,6 +7,7 @@ import shutil
 import socket
 import threading
 import time
+from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,6 +24,7 @@ from psvideo.clip.filters import check_live_filters
 from psvideo.clip.record import Header
 from psvideo.clip.streams.growing_folder import _new_files, read_growing
 from psvideo.clip.streams.stream import StreamPlaces, read_stream
+from psvideo.clip.streams.stream_rate import StreamRate
 from psvideo.live.chain import Chain
 from psvideo.live.incoming.sources import opened_source
 
@@ -292,3 +294,31 @@ def test_bare_bytes_of_an_unknown_kind_are_refused_with_the_kinds_that_are_read(
     assert f"--raw {raw}" in error
     assert "gray, gray10le, gray12le, gray16le, rgb24" in error
     assert said in error
+
+
+def rate_said(planned_hz: float, stamps_s: Iterable[float]) -> float | None:
+    rate = StreamRate(planned_hz=planned_hz)
+    return next((other for stamp_s in stamps_s if (other := rate.other_hz(stamp_s)) is not None), None)
+
+
+@pytest.mark.parametrize("true_hz", [24, 25, 29.97, 30, 50, 60, 100, 119.88, 120, 240])
+@pytest.mark.parametrize("planned_hz", [24, 25, 29.97, 30, 50, 60, 100, 119.88, 120, 240])
+@pytest.mark.parametrize("tick_s", [1e-9, 1e-3])
+def test_a_stream_at_another_rate_than_planned_is_known_by_its_stamps_and_no_other(
+    true_hz: float, planned_hz: float, tick_s: float
+) -> None:
+    """Whole milliseconds, as some containers hold; frames are lost, and that is no rate."""
+    rng = np.random.default_rng(0)
+    stamps_s = [round(n / true_hz / tick_s) * tick_s for n in range(200) if n < 2 or rng.random() > 0.1]
+    found = rate_said(planned_hz, stamps_s)
+    if abs(true_hz / planned_hz - 1) < 0.002:
+        assert found is None
+    else:
+        assert found == pytest.approx(true_hz, rel=0.012)
+
+
+def test_stamps_of_when_frames_came_in_bursts_or_began_again_say_no_rate() -> None:
+    in_bursts = [n // 4 * 4 / 100 + n % 4 * 1e-4 for n in range(200)]
+    again = [*(n / 30 for n in range(20)), *(n / 100 for n in range(200))]
+    assert rate_said(100, in_bursts) is None
+    assert rate_said(100, again) is None

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from statistics import median
 
 import av
 
@@ -19,6 +18,7 @@ from psvideo.clip.filters import check_live_filters
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture, Frame
+from psvideo.clip.streams.stream_rate import StreamRate
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import Camera
 from psvideo.model.units import counted
@@ -28,9 +28,6 @@ OPEN_S = 20.0
 """A stream that has not begun after this long is taken for missing."""
 LEAP_S = 5.0
 """Stamps that leap by more are another stream's."""
-JUDGED = 24
-"""Frames by which a stream's rate is compared with the plan's."""
-OFF = 0.02
 MOST_DAMAGED = 24
 """A stream of which more frames in a row cannot be decoded is no stream of pictures."""
 FEW_PX = 16
@@ -102,16 +99,17 @@ def read_stream(
     PsvideoError where nothing comes, or what comes is not the camera's.
     """
     name = "standard input" if source == STANDARD_INPUT else source
-    stamps, steps = StreamPlaces(rate_hz=float(camera.fps)), list[int]()
+    stamps, rate = StreamPlaces(rate_hz=float(camera.fps)), StreamRate(planned_hz=float(camera.fps))
     first: CodedPicture | None = None
-    before = 0
     for stamp_s, picture in _decoded(source, name, camera, raw, noted):
         _check(name, picture, camera, first)
         place = stamps.place(stamp_s, time.monotonic())
-        if first is not None and len(steps) < JUDGED:
-            steps.append(place - before)
-            _check_rate(name, steps, camera)
-        first, before = first or picture, place
+        if (other_hz := rate.other_hz(stamp_s)) is not None:
+            raise PsvideoError(
+                f"{name}: its time stamps are {other_hz:.4g} frames a second, and the plan says "
+                f"{float(camera.fps):.6g}. Correct fps in the plan, or set the camera to it."
+            )
+        first = first or picture
         yield Frame(index=place, number=place, coded=in_codes(picture, camera.encoding))
     if first is None:
         raise PsvideoError(f"{name}: ended before its first whole frame. Start what sends it, then psvideo live again.")
@@ -193,13 +191,4 @@ def _check(name: str, picture: CodedPicture, camera: Camera, first: CodedPicture
         raise PsvideoError(
             f"{name}: sends {looks(head)} all of a sudden, and began with {looks(first.header)}. Somebody changed the "
             "camera's mode: start psvideo live again."
-        )
-
-
-def _check_rate(name: str, steps: list[int], camera: Camera) -> None:
-    usual = median(steps)
-    if len(steps) == JUDGED and usual > 1 + OFF:
-        raise PsvideoError(
-            f"{name}: its time stamps are {float(camera.fps / round(usual)):.6g} frames a second, and the plan says "
-            f"{float(camera.fps):.6g}. Correct fps in the plan, or set the camera to it."
         )
