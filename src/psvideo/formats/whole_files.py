@@ -27,7 +27,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield beside
         beside.replace(path)
     except OSError as fault:
-        raise _not_written(path, fault) from fault
+        raise not_written(path, fault) from fault
     finally:
         with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
@@ -43,14 +43,15 @@ def check_can_be_written(path: Path) -> None:
         beside.touch()
         beside.unlink()
     except OSError as fault:
-        raise _not_written(path, fault) from fault
+        raise not_written(path, fault) from fault
 
 
 def _beside(path: Path) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}-{HERE}.partial")
 
 
-def _not_written(path: Path, fault: OSError) -> PsvideoError:
+def not_written(path: Path, fault: OSError) -> PsvideoError:
+    """Return what to raise where a file or folder cannot be written."""
     return PsvideoError(
         f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
         "check the folder's permissions, then run the command again."

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.plan_toml import PLAN_FILE
-from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.formats.whole_files import not_written, refuse_existing, write_text
 from psvideo.formats.written_files import note_written, refuse_others
 
 if sys.platform != "win32":
@@ -113,14 +113,15 @@ def _still_there(beside: Path, path: Path, settings: str) -> Iterator[None]:
 def _said_where(path: Path, *, resumable: bool = False) -> Iterator[None]:
     """Make of a folder that cannot be written a PsvideoError that names it, and says of a run that may be resumed how
     not to lose what is finished."""
-    kept = " Give `resume` with it: what is finished is kept, and a run without begins anew." if resumable else ""
+    kept = (
+        " Give `resume` with it: then what is finished is kept; without it the run starts from the beginning."
+        if resumable
+        else ""
+    )
     try:
         yield
     except OSError as fault:
-        raise PsvideoError(
-            f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
-            f"check the folder's permissions, then run the command again.{kept}"
-        ) from fault
+        raise PsvideoError(f"{not_written(path, fault)}{kept}") from fault
     except PsvideoError as fault:
         if not (kept and isinstance(fault.__cause__, OSError) and fault.__cause__.errno in FULL):
             raise

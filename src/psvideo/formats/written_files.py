@@ -32,8 +32,9 @@ def refuse_others(path: Path) -> None:
     noted = path / WRITTEN
     if not noted.is_file():
         raise UsageError(
-            f"{path}: holds no {WRITTEN}, the list of what a run wrote there, so what is yours in it cannot be told "
-            "from that, and it is not replaced, not even with `force`. Name another output, or remove it yourself."
+            f"{path}: has no {WRITTEN}, the list in which a run notes the files that it wrote, so files of your own "
+            "cannot be told from those. The folder is not replaced, not even with `force`. Name another output, or "
+            "remove the folder yourself."
         )
     try:
         own = {WRITTEN, *map(str, json.loads(noted.read_text(encoding="utf-8")))}
@@ -45,8 +46,8 @@ def refuse_others(path: Path) -> None:
     others = sorted(name for name in _files_in(path) - own if not _of_the_system(name))
     if others:
         raise UsageError(
-            f"{path}: holds what the run before did not write: {listed(others, NAMED)}. It would be gone with the "
-            "folder, so that is not replaced, not even with `force`. Move it elsewhere, or name another output."
+            f"{path}: holds files that the earlier run did not write: {listed(others, NAMED)}. They would be gone with "
+            "the folder, so it is not replaced, not even with `force`. Move them elsewhere, or name another output."
         )
 
 
