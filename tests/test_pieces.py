@@ -513,13 +513,11 @@ def test_a_scheduler_that_is_killed_leaves_a_run_that_resume_ends(tmp_path: Path
     normals = [sys.executable, "-m", "psvideo.cli.app", "normals", *given]
     subprocess.run([*normals, str(tmp_path / "one" / "clip")], check=True)
     where = tmp_path / "scheduler.json"
-    dask, file = str(Path(sys.executable).with_name("dask")), ["--scheduler-file", str(where)]
-    here = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    scheduler = subprocess.Popen([dask, "scheduler", *here, *file], stderr=subprocess.DEVNULL)
-    while not where.is_file():
-        time.sleep(0.05)
-    worker = subprocess.Popen([dask, "worker", *file, "--nthreads", "1"], stderr=subprocess.DEVNULL)
-    address = json.loads(where.read_text(encoding="utf-8"))["address"]
+    dask = str(Path(sys.executable).with_name("dask"))
+    here = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(where)]
+    scheduler = subprocess.Popen([dask, "scheduler", *here], stderr=subprocess.DEVNULL)
+    address = _address_in(where)
+    worker = subprocess.Popen([dask, "worker", address, "--nthreads", "1"], stderr=subprocess.DEVNULL)
     try:
         out = tmp_path / "two" / "clip"
         running = subprocess.Popen([*normals, str(out), "--scheduler", address], stderr=subprocess.PIPE, text=True)
@@ -537,6 +535,16 @@ def test_a_scheduler_that_is_killed_leaves_a_run_that_resume_ends(tmp_path: Path
     subprocess.run([*normals, str(out), "--resume"], check=True)
     assert digest(out) == digest(tmp_path / "one" / "clip")
     assert not [*out.parent.glob(".*")]
+
+
+def _address_in(where: Path) -> str:
+    """Return a scheduler's address once its file is whole: dask opens the file first and writes into it later."""
+    until_s = time.monotonic() + 300
+    while time.monotonic() < until_s:
+        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
+            return str(json.loads(where.read_text(encoding="utf-8"))["address"])
+        time.sleep(0.05)
+    raise TimeoutError(f"{where} was not written")
 
 
 def _when_solving(beside: Path, parent: psutil.Process) -> list[psutil.Process]:
