@@ -16,12 +16,13 @@ from picture_file import read_picture
 
 import psvideo as ps
 from psvideo.calibrate.cho2020 import measure_strengths
-from psvideo.calibrate.flat_field import Target, measure_flat_field, with_intensities
+from psvideo.calibrate.flat_field import measure_flat_field, with_intensities
 from psvideo.calibrate.guess import guess_rig
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
 from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.calibrate.white_target import Target
 from psvideo.cli.app import main
 from psvideo.cli.options.typed import parse_box, parse_seconds, parse_starts_s
 from psvideo.errors import PsvideoError, UsageError

@@ -10,9 +10,9 @@ import OpenEXR
 import pytest
 
 import psvideo as ps
-from psvideo.calibrate.flat_field import Target
 from psvideo.calibrate.led_colours import measure_led_colours, with_colours
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
+from psvideo.calibrate.white_target import Target
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig

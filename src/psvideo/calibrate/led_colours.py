@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from psvideo.calibrate.flat_field import Target, on_target, parts_of
 from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.calibrate.white_target import Target, on_target, parts_of
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.colours import (

@@ -32,49 +32,66 @@ def exposure(observed: Observed, *, unused_stops: float = 0.0) -> Iterator[Judge
     """Judge how bright the brightest lamp's plates are, and how much each lamp clips; ``unused_stops``: by how many the
     largest code lies above all that a camera records."""
     levels = {light: observed.levels(light) for light in observed.lights if light in observed.counts}
-    if not any(one.total for one in levels.values()) and _mask_slips(observed):
-        yield Judgement(
-            subject="mask",
-            grade="doubtful",
-            found="The mask is too small to be judged: this report looks at every fourth row and column, or fewer of "
-            "large pictures, and none of its points lies in the mask.",
-            advice="Look at the results themselves, or paint the mask wider.",
-        )
-        return
     if not any(one.total for one in levels.values()):
-        yield Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
+        yield _too_small_a_mask() if _mask_slips(observed) else _unlit()
         return
     if observed.beyond_mask and min(observed.beyond_mask) > MISPLACED:
-        yield Judgement(
-            subject="mask",
-            grade="bad",
-            found=f"The mask leaves out what is lit: beyond it the picture is {min(observed.beyond_mask):.0f} times as "
-            "bright as within.",
-            advice="Paint white where normals are wanted, and black elsewhere; the mask may be inverted.",
-        )
+        yield _misplaced_mask(min(observed.beyond_mask))
     clipped = list(_clipping(levels))
-    top = max(one.stops(TARGET_QUANTILE) for one in levels.values())
-    worst = max(one.clipped_share for one in levels.values())
+    top_stops = max(one.stops(TARGET_QUANTILE) for one in levels.values())
     under = (
         "saturation" if not unused_stops else "the largest code, which this curve puts above what any sensor records"
     )
-    if top < DIM_STOPS - unused_stops:
-        yield Judgement(
-            subject="exposure",
-            grade="bad" if top < DARK_STOPS - unused_stops else "doubtful",
-            found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
-            f"{under}, so noise is large.",
-            advice=f"Open the aperture by about {_half(BEST_STOPS - unused_stops - top)}, or flash longer or stronger. "
-            "Where files hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead.",
-        )
+    if top_stops < DIM_STOPS - unused_stops:
+        yield _dark(top_stops, unused_stops, under)
     elif not clipped:
-        yield Judgement(
-            subject="exposure",
-            grade="good",
-            found=f"The brightest parts {_reach(top, under)}, and at most {100 * worst:.1f} % of the subject is "
-            "clipped.",
-        )
+        yield _bright_enough(top_stops, max(one.clipped_share for one in levels.values()), under)
     yield from clipped
+
+
+def _unlit() -> Judgement:
+    return Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
+
+
+def _too_small_a_mask() -> Judgement:
+    return Judgement(
+        subject="mask",
+        grade="doubtful",
+        found="The mask is too small to be judged: this report looks at every fourth row and column, or fewer of "
+        "large pictures, and none of its points lies in the mask.",
+        advice="Look at the results themselves, or paint the mask wider.",
+    )
+
+
+def _misplaced_mask(times_as_bright: float) -> Judgement:
+    return Judgement(
+        subject="mask",
+        grade="bad",
+        found=f"The mask leaves out what is lit: beyond it the picture is {times_as_bright:.0f} times as bright as "
+        "within.",
+        advice="Paint white where normals are wanted, and black elsewhere; the mask may be inverted.",
+    )
+
+
+def _dark(top_stops: float, unused_stops: float, under: str) -> Judgement:
+    return Judgement(
+        subject="exposure",
+        grade="bad" if top_stops < DARK_STOPS - unused_stops else "doubtful",
+        found="The picture is dark: its brightest parts under the brightest light are "
+        f"{-top_stops:.1f} stops below {under}, so noise is large.",
+        advice=f"Open the aperture by about {_half(BEST_STOPS - unused_stops - top_stops)}, or flash longer or "
+        "stronger. Where files hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so "
+        "instead.",
+    )
+
+
+def _bright_enough(top_stops: float, clipped_share: float, under: str) -> Judgement:
+    return Judgement(
+        subject="exposure",
+        grade="good",
+        found=f"The brightest parts {_reach(top_stops, under)}, and at most {100 * clipped_share:.1f} % of the subject "
+        "is clipped.",
+    )
 
 
 def _mask_slips(observed: Observed) -> bool:

@@ -30,31 +30,14 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         return _places(observed)
     share = float(np.quantile(shares, OFTEN))
     if len(speeds) < LEAST_FOLLOWED * len(shares):
-        return Judgement(
-            subject="motion",
-            grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
-            found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed, or "
-            "repeats itself meanwhile"
-            + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else ".")
-            + (" The open shutter shows the single flashes there, and no blur between them." if opened else ""),
-            advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers, or the "
-            "movie's coding changes the pictures.",
-        )
-    speed = float(np.quantile(speeds, OFTEN))
+        return _not_followed(share, aligned=aligned, opened=opened)
     flash_s = timing.frame_period_s if plan.mode == "synced" else plan.cycle_s / len(plan.cycle_slots)
+    speed, most_px = float(np.quantile(speeds, OFTEN)), max(speeds) * flash_s
     step_px = speed * flash_s
-    blur_px = speed * max(plan.flashes[slot].duration_s for slot in plan.lit_slots)
-    if plan.mode == "synced":
-        blur_px = step_px
     if step_px <= FAST_PX:
-        most_px = max(speeds) * flash_s
-        still = "Nothing moves." if most_px < 0.01 else f"At most {most_px:.2f} px of motion from flash to flash."
-        if most_px > FAST_PX:
-            still = (
-                f"In nine of ten rounds at most {step_px:.2f} px of motion from flash to flash, in the others up to "
-                f"{most_px:.1f} px."
-            )
-        return Judgement(subject="motion", grade="good", found=still)
+        return Judgement(subject="motion", grade="good", found=_slow(step_px, most_px))
+    longest_s = max(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    blur_px = step_px if plan.mode == "synced" else speed * longest_s
     grave = step_px > LOST_PX and share > FEW_MOVE and not aligned
     return Judgement(
         subject="motion",
@@ -63,6 +46,31 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}." + _unfrozen(plan, timing, observed, speed),
         advice="Move slower, raise the frame rate or flash fewer lights"
         + (", or leave `align` at auto, which brings the plates together." if not aligned else "."),
+    )
+
+
+def _not_followed(share: float, *, aligned: bool, opened: bool) -> Judgement:
+    return Judgement(
+        subject="motion",
+        grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
+        found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed, or "
+        "repeats itself meanwhile"
+        + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else ".")
+        + (" The open shutter shows the single flashes there, and no blur between them." if opened else ""),
+        advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers, or the "
+        "movie's coding changes the pictures.",
+    )
+
+
+def _slow(step_px: float, most_px: float) -> str:
+    """Say how far things move where that is little: in nine of ten rounds, and the most in any."""
+    if most_px < 0.01:
+        return "Nothing moves."
+    if most_px <= FAST_PX:
+        return f"At most {most_px:.2f} px of motion from flash to flash."
+    return (
+        f"In nine of ten rounds at most {step_px:.2f} px of motion from flash to flash, in the others up to "
+        f"{most_px:.1f} px."
     )
 
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.calibrate.flat_field import FlatLight, Target, falloff_of, measure_flat_field, with_intensities
+from psvideo.calibrate.flat_field import FlatLight, falloff_of, measure_flat_field, with_intensities
 from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.calibrate.white_target import Target
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError, said_of
 from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
