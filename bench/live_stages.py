@@ -10,12 +10,13 @@ import numpy as np
 
 from bench.live_scene import CFA, coded, frames, plan_of, rig
 from bench.table import Row
-from psvideo.live.chain import GRID_PX, LiveFrame, NewestRound
-from psvideo.live.following.follow import caught_up
+from psvideo.live.following.catching_up import caught_up
 from psvideo.live.following.history import timing_now
 from psvideo.live.following.lock import frames_to_lock, lock
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.ring import RingFrame, ring_of
 from psvideo.live.showing.newest_pictures import NewestPictures
+from psvideo.live.showing.newest_result import GRID_PX, NewestRound
 from psvideo.live.showing.newest_round import LiveRounds
 from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.live.watching import LOOK_S, Watching

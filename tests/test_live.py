@@ -13,8 +13,8 @@ import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig
-from psvideo.live import chain
-from psvideo.live.chain import NewestRound
+from psvideo.live.showing import newest_result
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.rows.recipe import flash_recipe
@@ -62,7 +62,7 @@ def test_what_the_subject_reflects_is_looked_at_again_after_some_rounds_and_held
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of a glossy ball under noise every look gives other numbers."""
-    monkeypatch.setattr(chain, "LOOKED_AGAIN", 4)
+    monkeypatch.setattr(newest_result, "LOOKED_AGAIN", 4)
     lights = [(0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6), (0.2, 0.1), (-0.3, 0.3)]
     listed = "".join(f"[[light]]\nname = 'l{n}'\ndirection = [{x}, {y}, 0.8]\n" for n, (x, y) in enumerate(lights))
     gloss = "specular = { strength = 0.3, roughness = 0.35 }\n"

@@ -12,8 +12,8 @@ import pytest
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 
 from psvideo.live.ball_lights import BallLights, lights_on_ball
-from psvideo.live.chain import NewestRound
 from psvideo.live.showing.newest_pictures import NewestPictures
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig

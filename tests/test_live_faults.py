@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from memory_frame import MemoryFrame
 
-from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.chain import Chain
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.showing.newest_pictures import NewestPictures
 from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.model.plan import Plan

@@ -16,9 +16,9 @@ from live_clip import live_clip
 
 import psvideo as ps
 from psvideo.errors import UsageError
-from psvideo.live.chain import NewestRound
 from psvideo.live.showing import newest_pictures
 from psvideo.live.showing.newest_pictures import NewestPictures, lit_rows
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.watching import ENOUGH, LOOK_S, STARVED, Watching, told

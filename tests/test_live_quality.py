@@ -45,7 +45,7 @@ def steps_over(quality: Quality, seconds: int, on: Callable[[int], LiveSecond]) 
     """The quality after so many seconds on a machine, and the steps on the way."""
     steps = [quality.step]
     for _ in range(seconds):
-        quality = quality.after(on(quality.step))
+        quality = quality.after_second(on(quality.step))
         steps.append(quality.step)
     return quality, steps
 
@@ -126,7 +126,7 @@ def test_viewers_who_draw_small_pictures_sooner_get_small_ones() -> None:
 
 def test_one_bad_second_changes_nothing() -> None:
     calm, _ = steps_over(Quality(step=2), 10, machine(0.002, 0.1))
-    assert calm.after(machine(0.002, 0.1, load=30)(2)).after(machine(0.002, 0.1)(2)).step == 2
+    assert calm.after_second(machine(0.002, 0.1, load=30)(2)).after_second(machine(0.002, 0.1)(2)).step == 2
 
 
 def test_frames_that_wait_make_the_picture_smaller_before_the_camera_drops_any() -> None:
@@ -141,7 +141,7 @@ def test_frames_that_wait_make_the_picture_smaller_before_the_camera_drops_any()
             behind.take(index, at_s)
             index += 1
         measured = quick(slow.step)
-        slow = slow.after(replace(measured, behind_s=behind.second_s()))
+        slow = slow.after_second(replace(measured, behind_s=behind.second_s()))
         if slow.step > 2:
             break
     assert 6 <= second <= 8, "a camera holds half a second of frames, and 0.2 s more wait after each"

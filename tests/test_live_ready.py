@@ -19,12 +19,14 @@ from psvideo.cli.app import main
 from psvideo.cli.commands.live import _Telling
 from psvideo.cli.console import Voice
 from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_counted
-from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.chain import Chain
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.result_times import ResultTimes
 from psvideo.live.running import Running
 from psvideo.live.showing.quality import first_quality
+from psvideo.live.standing import Counted
 from psvideo.live.status import SAID, LiveState, LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
 from psvideo.model.coded import Coded, Tone
@@ -173,7 +175,7 @@ def test_darkness_is_said_to_be_dark_while_the_run_goes_on(make_plan: PlanMaker)
     for place in range(80):
         dark = np.zeros((plan.camera.height_px, plan.camera.width_px), np.float32)
         chain.take(LiveFrame(index=place, coded=MemoryFrame(place, dark).coded, came_s=0.0))
-        said = said or waiting.look(0.01 * place, state=chain.state, frames=chain.seen, why=chain.why)
+        said = said or waiting.look(0.01 * place, state=chain.state, frames=chain.count.seen, why=chain.why)
     assert "its rows do not change at all from frame to frame. Check that the lights flashed" in said
 
 
@@ -228,8 +230,8 @@ def test_one_late_result_of_a_second_is_late_though_most_are_not(make_plan: Plan
         drawn_ages_s=lambda since_s: [0.05, 0.06, 0.05, 0.31],
     )
     running.times = ResultTimes(count=4, ages_s=[0.03, 0.04, 0.03, 0.28], _made_s=[0.02] * 4)
-    status = running._status(1.0, 1.0, (0, 0))
-    measured = running.times.second(status, plan, behind_s=0.0)
+    status = running._status(1.0, 1.0, Counted())
+    measured = running.times.last_second(status, plan, behind_s=0.0)
     assert status.age_s == pytest.approx(0.055)
     assert status.oldest_s == 0.31
     assert measured is not None

@@ -18,8 +18,8 @@ from psvideo.clip import open_clip, read_frames
 from psvideo.errors import UsageError
 from psvideo.export.sequences import code_files
 from psvideo.export.sequences.code_files import write_codes
-from psvideo.live.chain import LiveFrame
 from psvideo.live.incoming import recording
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.recording import Recording
 from psvideo.live.incoming.source import played_clip
 from psvideo.live.status import LiveStatus

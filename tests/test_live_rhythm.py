@@ -40,7 +40,7 @@ def shown(*, round_s: float, frame_s: float, takes_s: float, keeps: bool = True)
     began, ages = [], []
     while (frame := int(np.searchsorted(came_s, now_s))) < len(came_s):
         now_s = max(now_s, came_s[frame])
-        now_s = max(now_s, rhythm.due_s(now_s) if keeps else due_s)
+        now_s = max(now_s, rhythm.next_begins_s(now_s) if keeps else due_s)
         newest = int(np.searchsorted(whole_s, now_s, side="right")) - 1
         if newest == last:
             now_s += LOOK_S
@@ -48,7 +48,7 @@ def shown(*, round_s: float, frame_s: float, takes_s: float, keeps: bool = True)
         last, due_s = newest, now_s + 1 / MOST_RATE
         began.append(now_s)
         ages.append(now_s - whole_s[newest])
-        rhythm = rhythm.after(began_s=now_s, came_s=float(whole_s[newest]))
+        rhythm = rhythm.after_result(began_s=now_s, came_s=float(whole_s[newest]))
         now_s += takes_s * rng.uniform(0.9, 1.3)
     return Shown(began_s=np.array(began), age_s=np.array(ages))
 
@@ -73,8 +73,8 @@ def test_waiting_for_rounds_costs_no_result_that_is_needed(round_s: float, takes
 
 
 def test_where_every_round_is_wanted_none_waits_and_there_is_time_until_the_next_is_whole() -> None:
-    rhythm = Rhythm(round_s=0.1, frame_s=0.01).after(began_s=5.0, came_s=4.99)
-    assert rhythm.due_s(5.03) == 5.03
+    rhythm = Rhythm(round_s=0.1, frame_s=0.01).after_result(began_s=5.0, came_s=4.99)
+    assert rhythm.next_begins_s(5.03) == 5.03
     assert rhythm.idle_until_s(5.03) == pytest.approx(5.09)
     assert rhythm.idle_until_s(5.12) == pytest.approx(5.19)
 
@@ -82,6 +82,8 @@ def test_where_every_round_is_wanted_none_waits_and_there_is_time_until_the_next
 def test_rounds_that_are_left_out_leave_time_until_the_one_after() -> None:
     rhythm = Rhythm(round_s=0.04, frame_s=0.01)
     for began_s in (0.0, 0.04, 0.08):
-        rhythm = rhythm.after(began_s=began_s, came_s=began_s)
-    assert rhythm.due_s(0.11) == pytest.approx(0.17), "three in 0.12 s are more than anybody sees: the next is left out"
+        rhythm = rhythm.after_result(began_s=began_s, came_s=began_s)
+    assert rhythm.next_begins_s(0.11) == pytest.approx(0.17), (
+        "three in 0.12 s are more than anybody sees: the next is left out"
+    )
     assert rhythm.idle_until_s(0.11) == pytest.approx(0.17)

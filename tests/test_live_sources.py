@@ -246,7 +246,7 @@ def test_frames_that_grow_are_called_by_their_files_numbers(clip: Path, tmp_path
     chain = Chain(plan=source.plan)
     for frame in found:
         chain.take(frame)
-    assert chain.first_number == 1001
+    assert chain.count.first_file == 1001
 
 
 def test_two_files_of_one_number_are_both_named(clip: Path, tmp_path: Path) -> None:

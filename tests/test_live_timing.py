@@ -10,12 +10,15 @@ from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
 from psvideo.formats.timing_json import parse_timing, timing_record
-from psvideo.live.chain import Chain, LiveFrame
-from psvideo.live.following.follow import Follower, Hole, State, caught_up
+from psvideo.live.chain import Chain
+from psvideo.live.following.catching_up import caught_up
+from psvideo.live.following.follow import Follower, State
+from psvideo.live.following.frame_places import Hole
 from psvideo.live.following.history import timing_of
 from psvideo.live.following.light_names import guess_words, order_of
 from psvideo.live.following.lock import check_followed, frames_to_lock, lock
 from psvideo.live.following.phase_filter import Measured, smoothed
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rows.row_profiles import collect
@@ -82,7 +85,7 @@ def test_live_agrees_with_offline_and_truth(make_plan: PlanMaker, what: str) -> 
     assert np.abs(apart_rows(found.timing, offline.start_s, plan)).max() < LIVE_ROWS
     names = {round(flash.start_s / plan.dark_s): flash.lights for flash in offline.flashes}
     assert all(names[round(flash.start_s / plan.dark_s)] == flash.lights for flash in found.timing.flashes)
-    assert sum(hole.count for hole in found.follower.holes) == (4 if what == "drops" else 0)
+    assert sum(hole.count for hole in found.follower.places.holes) == (4 if what == "drops" else 0)
 
 
 @pytest.mark.parametrize("what", ["strobe restarted", "lens covered"])
@@ -131,7 +134,7 @@ def test_frames_that_the_lock_or_the_follower_finds_missing_are_counted_and_keep
         chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
     assert len(chain.followed) == 2
     assert chain.state == "locked"
-    assert [hole for one in chain.followed for hole in one.holes] == [
+    assert [hole for one in chain.followed for hole in one.places.holes] == [
         Hole(before=20, count=1),
         Hole(before=64, count=1),
     ]
@@ -214,7 +217,7 @@ def is_lost_and_found_again(plan: Plan, again: TrueClock, *, missing: int) -> No
     assert chain.state == "locked"
     assert len(chain.followed) == 2
     assert chain.lost_frames == missing
-    holes = [hole for one in chain.followed for hole in one.holes]
+    holes = [hole for one in chain.followed for hole in one.places.holes]
     assert holes == ([Hole(before=80, count=missing)] if missing else [])
     timing = timing_of(chain.followed, clip="clip")
     whole = replace(timing, flashes=tuple(one for one in timing.flashes if one.complete))

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from memory_frame import MemoryFrame
 
-from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.chain import Chain
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing

@@ -7,9 +7,10 @@ from typing import Protocol
 import numpy as np
 from memory_frame import MemoryFrame
 
-from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.chain import Chain
 from psvideo.live.following.genlock import DarkRow, dark_row
 from psvideo.live.following.holding import Holding
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.plan import Plan
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.boards import Board as KnownBoard

@@ -88,6 +88,7 @@ def flash_for_duty_s(request: ShootRequest, max_duty: float) -> float:
     """Return the longest flash at which each of the lights, flashing once a round, is on for ``max_duty`` of the time.
 
     That is the long marker's where there is one; the other lights' flashes are shorter then, and the round with them.
+    A round lasts so many times the longest flash (``flashes``), and a time besides that no flash changes.
     """
     period_s, dark_slots = request.camera.frame_period_s, _dark_slots_of_a_round(request)
     slots = len(request.lights) + dark_slots
@@ -95,22 +96,26 @@ def flash_for_duty_s(request: ShootRequest, max_duty: float) -> float:
         return max_duty * slots * period_s
     lit = 1 + (len(request.lights) - 1) / _longest_by(request)
     slot_s = request.dark_slot_s or 0.0
-    grows = lit if request.dark_slot_s else lit + dark_slots
+    flashes = lit if request.dark_slot_s else lit + dark_slots
     if request.mode == "half-rate" and not request.dark_s:
         # The longest slot, the flash or the dark one, starts every two frames; dark times shrink by its length.
-        by_flash_s = _meets(max_duty, grows=grows - slots, stays_s=slots * 2 * period_s + dark_slots * slot_s)
-        by_slot_s = _meets(max_duty, grows=grows, stays_s=slots * (2 * period_s - slot_s) + dark_slots * slot_s)
+        by_flash_s = _flash_at_duty(
+            max_duty, flashes=flashes - slots, besides_s=slots * 2 * period_s + dark_slots * slot_s
+        )
+        by_slot_s = _flash_at_duty(
+            max_duty, flashes=flashes, besides_s=slots * (2 * period_s - slot_s) + dark_slots * slot_s
+        )
         return min(by_flash_s, by_slot_s) if request.marker in ("dark", "coded") else by_flash_s
     dark_s = request.dark_s or default_dark_s(
         request.camera, (), mode="rolling", clock_tolerance_ppm=request.clock_tolerance_ppm
     )
-    return _meets(max_duty, grows=grows, stays_s=slots * dark_s + dark_slots * slot_s)
+    return _flash_at_duty(max_duty, flashes=flashes, besides_s=slots * dark_s + dark_slots * slot_s)
 
 
-def _meets(max_duty: float, *, grows: float, stays_s: float) -> float:
-    """Return the flash that is ``max_duty`` of a round, which lasts ``grows`` times the flash and ``stays_s``."""
-    share = max_duty * grows
-    return max_duty * stays_s / (1 - share) if share < 1 else math.inf
+def _flash_at_duty(max_duty: float, *, flashes: float, besides_s: float) -> float:
+    """Return the flash that is ``max_duty`` of a round which lasts ``flashes`` times the flash and ``besides_s``."""
+    share = max_duty * flashes
+    return max_duty * besides_s / (1 - share) if share < 1 else math.inf
 
 
 def _dark_slots_of_a_round(request: ShootRequest) -> float:

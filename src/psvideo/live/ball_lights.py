@@ -12,7 +12,7 @@ from psvideo.calibrate.mirror.sighting import sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.side_threads import run_beside
 from psvideo.errors import PsvideoError
-from psvideo.live.chain import NewestRound
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.smaller import smaller_rig
 from psvideo.model.rig import Rig
 

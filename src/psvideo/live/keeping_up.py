@@ -38,7 +38,7 @@ class KeepingUp:
                 f"{self.source}: its frames come at {status.fps:.1f} a second, and the plan says "
                 f"{float(self.plan.camera.fps):.5g}: what sends or reads them does not keep up."
             )
-        before, self.quality = self.quality.step, self.quality.after(measured)
+        before, self.quality = self.quality.step, self.quality.after_second(measured)
         if self.quality.step != before:
             word = "smaller, to keep up" if self.quality.step > before else "larger: there is time for it"
             camera = smaller_plan(self.plan, self.quality.step).camera

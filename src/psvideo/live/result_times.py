@@ -46,7 +46,7 @@ class ResultTimes:
         """Return the ages of the results after the first ``count``."""
         return self.ages_s[len(self.ages_s) - max(self.count - count, 0) :]
 
-    def second(self, status: LiveStatus, plan: Plan, *, behind_s: float) -> LiveSecond | None:
+    def last_second(self, status: LiveStatus, plan: Plan, *, behind_s: float) -> LiveSecond | None:
         """Return what the last second's results came to; None where none was made, nor was being made all the time."""
         since_s, made_s, self._made_s = self._making_since_s, self._made_s, []
         if not made_s and since_s is not None and self.count and time.monotonic() - since_s > STATUS_S:

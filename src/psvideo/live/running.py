@@ -7,23 +7,22 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 
-import numpy as np
-
 from psvideo.compute.compile_count import CompileCount, compiles_counted
 from psvideo.compute.heap import no_looks_at_what_is_loaded
 from psvideo.compute.side_threads import run_beside
-from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
+from psvideo.live.chain import Chain, search_here
 from psvideo.live.following.holding import Holding
-from psvideo.live.following.light_names import guess_words, order_of
 from psvideo.live.incoming.behind import Behind
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.recording import Recording
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.keeping_up import KeepingUp
 from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.result_times import STATUS_S, ResultTimes
 from psvideo.live.rhythm import Rhythm
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.quality import Quality
-from psvideo.live.showing.smaller import smaller_plan
+from psvideo.live.standing import Counted, Standing
 from psvideo.live.status import LiveState, LiveStatus, LiveSummary
 from psvideo.live.waiting import Waiting
 
@@ -101,7 +100,7 @@ class Running:
         fault = self._fault or self.chain.fault
         if fault is not None:
             raise fault
-        return self._summary(time.monotonic() - began_s)
+        return self._standing.summary(began_s, first_lock_s=self.first_lock_s, paced=self.source.paced)
 
     def _one_by_one(self, began_s: float) -> None:
         """Take and solve in turn: for a clip that is played as fast as it goes, so that nothing depends on time."""
@@ -114,13 +113,13 @@ class Running:
             if self._stop.is_set() or self._over(frame.index):
                 break
         took_s = time.monotonic() - began_s
-        self.said(self._status(took_s, took_s, (0, 0)))
+        self.said(self._status(took_s, took_s, Counted()))
 
     def _get_ready(self, began_s: float) -> None:
         """Rehearse, and say how far that is."""
 
         def said() -> None:
-            self.said(self._status(time.monotonic() - began_s, STATUS_S, (0, 0)))
+            self.said(self._status(time.monotonic() - began_s, STATUS_S, Counted()))
 
         self._preparing = True
         wrong = prepared(self.prepare, said=said, every_s=STATUS_S)
@@ -149,13 +148,13 @@ class Running:
 
         Ctrl-C is how live runs of cameras end: what was recorded and followed is written as at the end of a clip.
         """
-        before, said_s = (0, 0), time.monotonic()
+        before, said_s = Counted(), time.monotonic()
         try:
             while not self._stop.wait(STATUS_S):
                 now_s = time.monotonic()
                 status = self._status(now_s - began_s, now_s - said_s, before)
                 self._adapt(status)
-                before, said_s = (status.frames, status.results), now_s
+                before, said_s = Counted(frames=status.frames, results=status.results), now_s
                 self.said(status)
         except KeyboardInterrupt:
             self.stop()
@@ -187,13 +186,13 @@ class Running:
             if not self._came.wait(IDLE_S):
                 continue
             now_s = time.monotonic()
-            if self._stop.wait(max(rhythm.due_s(now_s) - now_s, 0.0)):
+            if self._stop.wait(max(rhythm.next_begins_s(now_s) - now_s, 0.0)):
                 continue
             self._came.clear()
             began_s = time.monotonic()
             newest = self._solve()
             if newest is not None:
-                rhythm = rhythm.after(began_s=began_s, came_s=newest.came_s)
+                rhythm = rhythm.after_result(began_s=began_s, came_s=newest.came_s)
                 self.meanwhile(newest, rhythm.idle_until_s(time.monotonic()))
 
     def _take(self, frame: LiveFrame) -> None:
@@ -206,7 +205,7 @@ class Running:
         if self.chain.fault is not None:
             self.stop()
         if self.first_lock_s is None and self.chain.follower is not None:
-            self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
+            self.first_lock_s = self.chain.count.seen * self.chain.plan.camera.frame_period_s
 
     def _solve(self) -> NewestRound | None:
         began_s = time.monotonic()
@@ -224,64 +223,38 @@ class Running:
     def _adapt(self, status: LiveStatus) -> None:
         """Make the picture smaller where there was no time for it, larger where there is, and say so."""
         behind_s = 0.0 if self._behind is None else self._behind.second_s()
-        measured = self.times.second(status, self.chain.plan, behind_s=behind_s)
+        measured = self.times.last_second(status, self.chain.plan, behind_s=behind_s)
         before = self._keeping_up.quality.step
         self.notes.extend(self._keeping_up.notes_on(status, measured))
         if self._keeping_up.quality.step != before:
             self.chain.step = self._keeping_up.quality.step
 
-    def _status(self, at_s: float, last_s: float, before: tuple[int, int]) -> LiveStatus:
-        chain, follower = self.chain, self.chain.follower
-        camera = smaller_plan(chain.plan, chain.step).camera
-        ages_s = self.drawn_ages_s(time.monotonic() - last_s) or self.times.ages_since(before[1])
+    def _status(self, at_s: float, last_s: float, before: Counted) -> LiveStatus:
+        """Return how things stand ``at_s`` after the run began, and keep that; of ``last_s``, since ``before``."""
+        chain = self.chain
         state: LiveState = "preparing" if self._preparing else chain.state
-        waits_for = self._waiting.look(at_s, state=state, frames=chain.seen, why=chain.why)
-        self.status = LiveStatus(
-            at_s=round(at_s, 3),
+        self.status = self._standing.status(
+            at_s,
             state=state,
-            fps=(chain.seen - before[0]) / last_s,
-            frames=chain.seen,
-            lost=chain.lost_frames,
-            results=self.times.count,
-            results_per_s=(self.times.count - before[1]) / last_s,
-            age_s=float(np.median(ages_s)) if ages_s else None,
-            oldest_s=max(ages_s, default=None),
-            phase_error_rows=None if follower is None else follower.error_rows,
-            clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
-            order=None if follower is None else order_of(chain.followed),
-            width_px=camera.width_px,
-            height_px=camera.height_px,
-            why=chain.why,
+            last_s=last_s,
+            before=before,
+            drawn_ages_s=self.drawn_ages_s(time.monotonic() - last_s),
             compiling=compiling_words(self._compiles, time.monotonic(), preparing=self._preparing),
-            waits_for=waits_for,
-            recorded=None if self.recording is None else self.recording.written,
-            off_rows=None if self.holding is None else self.holding.short_rows,
-            trim_ppm=None if self.holding is None or self.holding.ended else self.holding.ppm,
-            notes=self.all_notes,
+            waits_for=self._waiting.look(at_s, state=state, frames=chain.count.seen, why=chain.why),
         )
         return self.status
 
-    def _summary(self, seconds: float) -> LiveSummary:
-        chain, follower = self.chain, self.chain.follower
-        ages = self.times.ages_s
-        return LiveSummary(
-            seconds=seconds,
-            frames=chain.seen,
-            lost=chain.lost_frames,
-            locks=len(chain.followed),
-            first_lock_s=self.first_lock_s,
-            results=self.times.count,
-            ages_s=(float(np.median(ages)), max(ages)) if ages and self.source.paced else None,
-            phase_error_rows=None if follower is None else follower.error_rows,
-            clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
-            recorded=None if self.recording is None else self.recording.written,
-            notes=self.all_notes,
+    @property
+    def _standing(self) -> Standing:
+        return Standing(
+            chain=self.chain,
+            times=self.times,
+            recording=self.recording,
+            holding=self.holding,
+            notes=(*self.source.notes, *self.notes),
         )
 
     @property
     def all_notes(self) -> tuple[str, ...]:
         """What there is to say of the run."""
-        ended = "" if self.recording is None else self.recording.ended
-        refused = "" if self.holding is None else self.holding.note
-        named = guess_words(self.chain.followed, first_light=self.chain.first_light)
-        return (*self.source.notes, *self.notes, *filter(None, (named, ended, refused)))
+        return self._standing.all_notes

@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.live.chain import NewestRound
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.status import LiveStatus
 from psvideo.model.channels import brightest_channel
 from psvideo.model.plan import Plan

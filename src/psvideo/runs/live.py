@@ -14,7 +14,7 @@ from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import check_can_be_written, check_ending, refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
-from psvideo.live.chain import Chain, NewestRound
+from psvideo.live.chain import Chain
 from psvideo.live.followed_timing import followed_timing
 from psvideo.live.following.lock import check_followed
 from psvideo.live.incoming.recording import FIRST_NUMBER, recorded_words, recording
@@ -22,6 +22,7 @@ from psvideo.live.incoming.source import LiveSource
 from psvideo.live.incoming.sources import opened_source
 from psvideo.live.running import Running
 from psvideo.live.showing.newest_pictures import NewestPictures
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.page_server import live_page
 from psvideo.live.showing.quality import first_quality
 from psvideo.live.showing.smaller import smaller_plan
@@ -141,7 +142,7 @@ def live(
         whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
         raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
     if timing_path is not None:
-        named = running.chain.first_number
+        named = running.chain.count.first_file
         name, first = played.name, played.first_number if named is None else named
         if record_path is not None:
             name, first = record_path.resolve().name, FIRST_NUMBER

@@ -41,5 +41,5 @@ def _in_order(plan: Plan, lock: Lock, values: Sequence[Doubles], doubts: Sequenc
     places = lock.places.tolist()
     for before, place, value, doubt in zip((None, *places), places, values, doubts, strict=False):
         if place != before:
-            window.add(HeldFrame(index=place, value=value, doubt=doubt))
+            window.add(HeldFrame(place=place, value=value, doubt=doubt))
     return window.profiles()

@@ -21,8 +21,10 @@ TAIL_S = 1.0
 class Trims:
     """Trims by time: from ``at_s[k]`` on flashes come later by ``ppm[k]`` of the time that passes, until the next.
 
-    Times are those of the strobe without trims, as a clock's bends have them: after minutes of the same trim they are
-    far from the camera's. Ten trims a second come for hours: what is asked of them costs the same after any number.
+    Two clocks are meant. The camera's, by which a trim is given and a flash is seen; and the *untrimmed* one, by which
+    the strobe would flash without any trim, and by which the times here, and a clock's bends, are. After 100 s of
+    -1000 ppm a flash that is seen at 100.0 s is the one of 100.1 s untrimmed. Ten trims a second come for hours: what
+    is asked of them costs the same after any number.
     """
 
     at_s: list[float] = field(default_factory=list)
@@ -36,21 +38,20 @@ class Trims:
 
     def add(self, at_s: float, ppm: float) -> None:
         """Note a trim from a time of the camera on, which is not before the last."""
-        without_s = self.without_s(at_s)
-        knot_s = max(without_s, self.at_s[-1]) if self.at_s else without_s
+        knot_s = max([self.untrimmed_s(at_s), *self.at_s[-1:]])
         self._late_s.append(self._late_at_s(knot_s))
         self.at_s.append(knot_s)
         self.ppm.append(ppm)
 
-    def without_s(self, at_s: float) -> float:
+    def untrimmed_s(self, at_s: float) -> float:
         """Return at which time a flash that comes at ``at_s`` would have come without any trim."""
-        without_s = at_s
+        untrimmed_s = at_s
         for _ in range(SETTLED):
-            without_s = at_s - self._late_at_s(without_s)
-        return without_s
+            untrimmed_s = at_s - self._late_at_s(untrimmed_s)
+        return untrimmed_s
 
     def late_s(self, time_s: Doubles) -> Doubles:
-        """Return by how much flashes come later at times, same shape, than without any trim."""
+        """Return by how much flashes come later than without any trim, at untrimmed times, same shape."""
         return np.array([self._late_at_s(one_s) for one_s in time_s.ravel().tolist()]).reshape(time_s.shape)
 
     def _late_at_s(self, time_s: float) -> float:
@@ -62,7 +63,7 @@ class Trims:
         slope."""
         if not self.at_s:
             return clock
-        first = bisect_left(self.at_s, self.without_s(since_s))
+        first = bisect_left(self.at_s, self.untrimmed_s(since_s))
         recent = sorted({*self.at_s[max(first - 2, 0) :]})
         knots = np.array([recent[0] - TAIL_S, *recent, recent[-1] + TAIL_S])
         return replace(clock, knot_s=tuple(knots.tolist()), bend_s=tuple(self.late_s(knots).tolist()))

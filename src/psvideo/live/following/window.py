@@ -25,7 +25,7 @@ MOST_ROWS = 96
 class HeldFrame:
     """One frame: its place in time, its row means (row,) and by how much these may be wrong (None: not)."""
 
-    index: int
+    place: int
     value: Doubles
     doubt: Doubles | None = None
 
@@ -45,28 +45,32 @@ class Window:
         """Take in one more frame, as the camera gave it, and let the oldest go."""
         rows = self._laid_out([frame])
         doubt = None if rows.doubt is None else rows.doubt[0]
-        self.frames.append(HeldFrame(index=frame.index, value=rows.value[0], doubt=doubt))
+        self.frames.append(HeldFrame(place=frame.place, value=rows.value[0], doubt=doubt))
         while len(self.frames) > self.memory:
             self.frames.popleft()
-        self.changes = [at for at in self.changes if at > self.frames[0].index]
+        self.changes = [at for at in self.changes if at > self.frames[0].place]
 
     def moved(self, first: int, extra: int) -> None:
         """Put the frames from the place ``first`` on by this many frames later."""
-        for place, frame in enumerate(self.frames):
-            if frame.index >= first:
-                self.frames[place] = replace(frame, index=frame.index + extra)
+        for at, frame in enumerate(self.frames):
+            if frame.place >= first:
+                self.frames[at] = replace(frame, place=frame.place + extra)
         self.changes = [at + extra if at >= first else at for at in self.changes]
 
     def since_change(self) -> int:
         """Return how many of the frames came after the last change of light."""
         if not self.changes:
             return len(self.frames)
-        return sum(frame.index >= self.changes[-1] for frame in self.frames)
+        return self.count_from(self.changes[-1])
+
+    def count_from(self, first: int) -> int:
+        """Return how many of the frames stand at a place or later."""
+        return sum(frame.place >= first for frame in self.frames)
 
     def profiles(self, latest: int | None = None) -> Profiles:
         """Return the frames, or the last ``latest`` of them, each stretch of equal light a window of its own."""
         frames = list(self.frames)[-(latest or len(self.frames)) :]
-        index = np.array([frame.index for frame in frames], np.int64)
+        index = np.array([frame.place for frame in frames], np.int64)
         starts = np.searchsorted(index, [at for at in self.changes if at > index[0]])
         doubts = [np.zeros_like(frame.value) if frame.doubt is None else frame.doubt for frame in frames]
         return Profiles(
@@ -83,7 +87,7 @@ class Window:
         doubt = None if frames[0].doubt is None else np.stack([np.asarray(frame.doubt) for frame in frames])
         rows = Profiles(
             value=value,
-            index=np.array([frame.index for frame in frames], np.int64),
+            index=np.array([frame.place for frame in frames], np.int64),
             period_s=self.period_s,
             place=np.arange(value.shape[1], dtype=np.float64),
             window_start=np.zeros(1, np.int64),

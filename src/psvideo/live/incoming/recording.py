@@ -21,7 +21,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.sequences.code_files import write_codes
 from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
 from psvideo.formats.whole_folders import forget_begun, unfinished_folder_of, whole_folder
-from psvideo.live.chain import LiveFrame
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource
 from psvideo.model.units import counted
 from psvideo.strobe.runlog import LOG_NAME

@@ -2,7 +2,7 @@
 
 import math
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from psvideo.model.coded import Coded
@@ -34,9 +34,17 @@ class Ring:
         while len(self.frames) > self.most:
             self.frames.popitem(last=False)
 
-    def moved(self, places: Mapping[int, int]) -> None:
-        """Give frames other places in time: what stood at a key stands at its value, what is not named goes."""
-        self.frames = OrderedDict((places[at], frame) for at, frame in self.frames.items() if at in places)
+    def of_height(self, height_px: int) -> dict[int, RingFrame]:
+        """Return the frames of so many rows: those of the size that is made now, and not of the one before."""
+        return {place: frame for place, frame in self.frames.items() if frame.coded.shape[0] == height_px}
+
+    def moved_from(self, first: int, later: int) -> None:
+        """Put the frames from the place ``first`` on by so many places later."""
+        self.placed(lambda place: later if place >= first else 0)
+
+    def placed(self, later: Callable[[int], int]) -> None:
+        """Give frames other places: each as many later as is returned for its own."""
+        self.frames = OrderedDict((place + later(place), frame) for place, frame in self.frames.items())
 
 
 def ring_of(plan: Plan) -> Ring:

@@ -11,7 +11,7 @@ from psvideo.clip import Clip, read_frames
 from psvideo.clip.linear import in_codes
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
-from psvideo.live.chain import LiveFrame
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.camera import Encoding
 from psvideo.model.choices import Pace
 from psvideo.model.coded import Coded

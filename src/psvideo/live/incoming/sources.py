@@ -12,7 +12,7 @@ from psvideo.clip.streams.growing_folder import read_growing
 from psvideo.clip.streams.stream import STANDARD_INPUT, is_device, read_stream, stream_kind
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import read_plan
-from psvideo.live.chain import LiveFrame
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource, plain_kind, played_clip
 from psvideo.model.choices import Pace
 from psvideo.model.plan import Plan

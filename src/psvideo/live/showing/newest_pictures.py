@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.live.chain import NewestRound
+from psvideo.live.showing.newest_result import NewestRound
 from psvideo.model.camera import Camera
 from psvideo.model.coded import Coded
 from psvideo.model.rows.shutter import row_weights

@@ -103,30 +103,39 @@ class Quality:
     drawn_s: float | None = None
     by_made: int = 0
 
-    def after(self, second: LiveSecond) -> "Quality":
-        """Return the quality after a second."""
+    def after_second(self, second: LiveSecond) -> "Quality":
+        """Return the quality after a second: as it was, with one more second counted, or of another size."""
         if self.since < FRESH:
             return replace(self, since=self.since + 1)
-        if self.drawn_s is not None:
-            helped = second.age_s <= HELPS * self.drawn_s
-            return replace(self, drawn_s=None, by_made=0 if helped else LONGEST_CALM).after(second)
-        if self.by_made:
-            return replace(self, by_made=self.by_made - 1)._judged(second.as_made)
-        return self._judged(second)
+        viewed = self._judging_viewers(second)
+        if viewed.by_made:
+            return replace(viewed, by_made=viewed.by_made - 1)._resized(second.as_made)
+        return viewed._resized(second)
 
-    def _judged(self, second: LiveSecond) -> "Quality":
+    def _judging_viewers(self, second: LiveSecond) -> "Quality":
+        """Where the picture was made smaller for viewers alone: leave aside when they draw it, if that did not help."""
+        if self.drawn_s is None:
+            return self
+        helped = second.age_s <= HELPS * self.drawn_s
+        return replace(self, drawn_s=None, by_made=0 if helped else LONGEST_CALM)
+
+    def _with_costs(self, second: LiveSecond) -> "Quality":
+        """Note what a second says of this size: whether it held, whether there was time, how much dearer it is."""
         held = self.grew and self.since + 1 >= HELD
-        now = replace(
+        dearer = {} if self.before_s is None else {self.step: second.made_s / max(self.before_s, 1e-9)}
+        return replace(
             self,
             late=self.late + 1 if second.is_late else 0,
             wait=CALM if held else self.wait,
             since=self.since + 1,
             grew=self.grew and not held,
             before_s=None,
-            dearer=self.dearer
-            if self.before_s is None
-            else {**self.dearer, self.step: second.made_s / max(self.before_s, 1e-9)},
+            dearer={**self.dearer, **dearer},
         )
+
+    def _resized(self, second: LiveSecond) -> "Quality":
+        """Return the quality at the size that a second, and those before it, leave time for."""
+        now = self._with_costs(second)
         larger = now._next(-1)
         spare = larger != self.step and second.spares(second.made_s * now.dearer_by(larger))
         now = replace(now, calm=self.calm + 1 if spare else 0)

@@ -8,8 +8,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.chain import Chain
 from psvideo.live.following.lock import frames_to_lock
+from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.showing.newest_pictures import NewestPictures
 from psvideo.live.showing.smaller import smaller_plan
