@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import UsageError
 from psvideo.formats.paths import path_of
 from psvideo.formats.plan_toml import PLAN_FILE, format_plan
 from psvideo.formats.rig_toml import format_rig
-from psvideo.formats.whole_files import refuse_existing
+from psvideo.formats.whole_files import not_written, refuse_existing
 from psvideo.formats.whole_folders import whole_folder
 from psvideo.model.arrays import Image
 from psvideo.synth.camera.encode import codes_of, mosaic, sensor_noise
@@ -112,10 +112,7 @@ def _nothing_left(folder: Path, out: Path) -> Iterator[None]:
         yield
     except OSError as fault:
         shutil.rmtree(folder, ignore_errors=True)
-        raise PsvideoError(
-            f"{out}: the clip cannot be written ({fault.strerror or fault}). Nothing was left under that name: make "
-            "room or check the folder's permissions, then run the command again."
-        ) from fault
+        raise not_written(out, fault) from fault
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
