@@ -102,4 +102,4 @@ def test_frames_left_out_keep_their_places_among_those_that_were_found(plan: Pla
     dark = np.array([True, True, False, False, True, True, False, False, True])
     assert with_unlit(rows, np.array([2, 3, 6, 7]), dark).tolist() == list(range(9))
     assert with_unlit(rows, np.array([2, 4, 9, 10]), dark).tolist() == [0, 1, 2, 4, 5, 6, 9, 10, 11]
-    assert with_unlit(rows, np.array([2, 3, 5, 6]), dark).tolist() == [0, 1, 2, 3, 4, 5, 5, 6, 7]
+    assert with_unlit(rows, np.array([2, 3, 5, 6]), dark).tolist() == [0, 1, 2, 3, 4, 4, 5, 6, 7]

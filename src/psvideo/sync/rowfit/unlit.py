@@ -73,14 +73,22 @@ def _longest_run(plan: Plan, rows: Profiles, times: int) -> int:
 
 
 def with_unlit(rows: Profiles, index: Integers, unlit: Mask) -> Integers:
-    """Return the places in time of all frames (frame,) from those that are lit; others follow the ones before them."""
+    """Return the places in time of all frames (frame,) from those that are lit; others follow the ones before them.
+
+    Where there are more of them than places until the next lit frame, the last ones count as repeated: that frame is
+    none.
+    """
     every = np.arange(len(unlit))
+    lit = np.flatnonzero(~unlit)
     before = np.maximum.accumulate(np.where(unlit, -1, every))
-    before = np.where(before < 0, int(np.argmin(unlit)), before)
+    before = np.where(before < 0, lit[0], before)
+    behind = np.minimum(np.searchsorted(lit, every), len(lit) - 1)
     places = np.empty(len(unlit), np.int64)
-    places[~unlit] = index
+    places[lit] = index
     found: Integers = places[before] + rows.index - rows.index[before]
-    return np.minimum.accumulate(found[::-1])[::-1]
+    most = np.maximum(index[behind] - 1, places[before])
+    between = unlit & (every > lit[0]) & (every < lit[-1])
+    return np.where(between, np.minimum(found, most), found)
 
 
 def _longest_dark_s(plan: Plan) -> float:
