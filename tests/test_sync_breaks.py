@@ -73,6 +73,9 @@ def off_rows(plan: Plan, timing: Timing, fired: tuple[TrueFlash, ...], frames: i
         pytest.param(4, 0.5, 0.6, 60, 25.48, 40.63, 2, id="dark"),
         pytest.param(3, 1.0, 1.0, 57, 33.1, 35.97, 1, id="hole-and-repeats"),
         pytest.param(3, 0.25, 0.6, 60, 42.96, 43.61, 1, id="between-two-exposures"),
+        pytest.param(3, 0.25, 0.83, 73, 13.82, 17.64, 876, id="more-dark-frames-than-places"),
+        pytest.param(3, 1.0, 0.78, 64, 30.11, 34.93, 15, id="three-dark-repeats"),
+        pytest.param(4, 0.5, 0.45, 71, 39.09, 43.08, 889, id="two-dark-repeats"),
     ],
 )
 def test_flashes_beside_a_break_are_complete_only_where_they_fired(

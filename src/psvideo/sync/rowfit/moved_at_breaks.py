@@ -22,6 +22,8 @@ from psvideo.sync.rowfit.tracking.losses import frame_losses
 
 FEW = 3
 """More frames that are missing (or repeated) in one place can stand for nearly any move."""
+PAUSE = 2
+"""So many that are repeated can stand for a strobe that paused: its frames in the dark look alike."""
 LONE = 2
 """Up to this many frames beyond such a place may fit somewhere by chance."""
 LEAST, NEAR = 6, 36
@@ -92,7 +94,8 @@ def _breaks(stray: Integers) -> Iterator[_Break]:
     edges = [0, *(np.flatnonzero(np.diff(stray)) + 1).tolist(), len(stray)]
     runs = [slice(a, b) for a, b in pairwise(edges) if b - a >= LEAST]
     for before, after in pairwise(runs):
-        if np.abs(np.diff(stray[before.stop - 1 : after.start + 1])).max() > FEW:
+        jumps = np.diff(stray[before.stop - 1 : after.start + 1])
+        if np.abs(jumps).max() > FEW or jumps.min() <= -PAUSE:
             yield _Break(
                 before=slice(max(before.start, before.stop - NEAR), before.stop),
                 after=slice(after.start, min(after.stop, after.start + NEAR)),
