@@ -260,9 +260,9 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), color=(1, 0, 0)),
         "no parameter `color`; did you mean 'colou",
     ),
-    "no rig": (
-        lambda: NOT_TYPED.normals("take3/", out="out/"),
-        "psvideo.normals: missing a required.* 'rig'; its param",
+    "no place": (
+        lambda: NOT_TYPED.normals("take3/", rig="rig.toml"),
+        "psvideo.normals: missing a required.* 'out'; its param",
     ),
     "too much": (
         lambda: NOT_TYPED.read_plan("plan.toml", "more"),

@@ -74,7 +74,7 @@ def _panels(path: str) -> dict[str, str | None]:
 
 
 def test_outside_of_a_panel_stands_only_what_normals_cannot_do_without() -> None:
-    assert {name for name, panel in _panels("normals").items() if panel is None} == {"rig", "out"}
+    assert {name for name, panel in _panels("normals").items() if panel is None} == {"out"}
 
 
 def test_every_name_in_the_table_of_panels_is_an_option() -> None:

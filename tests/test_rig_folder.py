@@ -1,4 +1,5 @@
-"""A folder of rigs, as a calibration of each of several takes leaves it: every take finds its own by its name."""
+"""A take's rig: of a folder of rigs, as a calibration of each of several takes leaves it, the one of its name; left
+out, the one beside the footage."""
 
 import json
 import shutil
@@ -94,3 +95,38 @@ def test_a_farms_job_names_the_takes_own_rig(place: Path) -> None:
     farm(place / "takes" / "shot2", rig=place / "rigs", out=place / "job")
     values = json.loads((place / "job" / "values.json").read_text(encoding="utf-8"))
     assert values["Rig"] == str((place / "rigs" / "shot2.toml").resolve())
+
+
+def test_a_rig_beside_the_footage_need_not_be_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    clip = place / "takes" / "shot1"
+    words = ["normals", str(clip), "--no-preview", "-o"]
+    assert main([*words, str(place / "none")]) == 2
+    said = " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert "there is no rig.toml here" in said
+    assert "psvideo calibrate mirror-sphere" in said
+    assert not (place / "none").exists()
+    shutil.copy(place / "rigs" / "shot1.toml", clip / "rig.toml")
+    assert main([*words, str(place / "left_out")]) == 0
+    assert "rig.toml says" in " ".join(capsys.readouterr().out.split())
+    assert main([*words, str(place / "named"), "--rig", str(clip / "rig.toml")]) == 0
+    assert "rig.toml says" not in capsys.readouterr().out
+    assert _first_normals(place / "left_out") == _first_normals(place / "named")
+
+
+def _first_normals(out: Path) -> bytes:
+    """Return the picture of the first map."""
+    return decode("exr", sorted((out / "normals").iterdir())[0]).codes.tobytes()
+
+
+def test_a_movie_has_its_rig_beside_it_and_takes_have_each_their_own(place: Path) -> None:
+    movie = place / "takes" / "take.mov"
+    movie.touch()
+    with pytest.raises(UsageError, match=r"there is no rig\.toml beside it"):
+        rig_of_take(None, movie)
+    (place / "takes" / "rig.toml").touch()
+    assert rig_of_take(None, movie) == place / "takes" / "rig.toml"
+    takes = [place / "takes" / name for name in ("shot1", "shot2")]
+    for take in takes:
+        shutil.copy(place / "rigs" / f"{take.name}.toml", take / "rig.toml")
+    assert [rig_of_take(None, take) for take in takes] == [take / "rig.toml" for take in takes]
+    assert f"--rig {takes[1] / 'rig.toml'}" in farm(takes[1], results=place / "results", pieces=1)[0]

@@ -1,4 +1,7 @@
-"""A folder of rigs, one for every take and named after it, as a calibration of each of several takes writes them."""
+"""Which rig belongs to a take: the one named, the one of its name in a folder of rigs, or rig.toml beside the footage.
+
+A calibration of each of several takes writes such a folder.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,17 +10,22 @@ from psvideo.errors import PsvideoError, UsageError, nearest
 from psvideo.formats.paths import path_of, take_name
 from psvideo.model.units import listed
 
+RIG_FILE = "rig.toml"
+"""What a rig is called that lies beside its footage."""
 RIGS = (".toml", ".lp", ".txt")
 """What rigs and light lists end with."""
 NAMED = 5
 """This many takes without a rig are named, and how many more there are is said."""
 
 
-def rig_of_take(rig: Path | str, clip: Path) -> Path:
-    """Return the rig of a take: the file itself, or of a folder of rigs the one that is named after the take.
+def rig_of_take(rig: Path | str | None, clip: Path) -> Path:
+    """Return the rig of a take: the file itself, of a folder of rigs the one that is named after the take, or, left
+    out, the one beside the footage.
 
-    Raises UsageError where the folder has none of that name, or several.
+    Raises UsageError where there is none, or where the folder has several of that name.
     """
+    if rig is None:
+        return _beside(clip)
     path = path_of("rig", rig)
     if not path.is_dir():
         return path
@@ -29,6 +37,17 @@ def rig_of_take(rig: Path | str, clip: Path) -> Path:
         names = ", ".join(one.name for one in found)
         raise UsageError(f"`rig` {path}: holds {names}, and {clip} has one rig. Take the others away, or name one.")
     raise UsageError(f"`rig` {path}: holds no rig for {clip}; expected {name}.toml. {_advice(path, name)}")
+
+
+def _beside(clip: Path) -> Path:
+    path = (clip if clip.is_dir() else clip.parent) / RIG_FILE
+    if not path.is_file():
+        raise UsageError(
+            f"{clip}: there is no {RIG_FILE} {'here' if clip.is_dir() else 'beside it'}, the file that says where the "
+            "lights are. psvideo calibrate mirror-sphere measures them on a chrome ball: put its rig beside the "
+            "footage, or name it with `rig`."
+        )
+    return path
 
 
 def check_rigs(rig: Path | str | None, clips: Sequence[Path | str]) -> None:

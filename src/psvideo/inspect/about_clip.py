@@ -11,6 +11,7 @@ from psvideo.clip.reading import looks, read_frames
 from psvideo.clip.record import Clip
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import find_plan
+from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.inspect.about_movie import movie_findings
 from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
@@ -78,7 +79,7 @@ def _findings(clip: Clip) -> Iterator[Finding]:
     yield from _likeness_findings(clip)
     yield from plan_findings(clip.filmed_plan)
     yield length_finding(clip.plan, clip.numbers)
-    rig = clip.plan_path.with_name("rig.toml")
+    rig = clip.plan_path.with_name(RIG_FILE)
     if rig.is_file():
         yield from rig_findings(rig, clip.plan)
     yield from _level_findings(clip)

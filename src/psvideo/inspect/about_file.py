@@ -13,6 +13,7 @@ from psvideo.clip.reading import looks
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import read_text
 from psvideo.formats.plan_toml import PLAN_FILE, read_plan
+from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.about_output import describe_output, output_around
@@ -77,7 +78,7 @@ def _schema(path: Path) -> str | None:
 
 def _plan(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
     plan = read_plan(path)
-    rig = path.with_name("rig.toml")
+    rig = path.with_name(RIG_FILE)
     findings = [*plan_findings(plan), *(rig_findings(rig, plan) if rig.is_file() else ())]
     facts: dict[str, Fact] = {
         "mode": plan.mode,

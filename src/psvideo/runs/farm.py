@@ -30,7 +30,7 @@ PIECE_ROUNDS = 300
 def farm(
     clip: Path | str,
     *,
-    rig: Path | str,
+    rig: Path | str | None = None,
     out: Path | str | None = None,
     results: Path | str | None = None,
     plan: Path | str | None = None,
@@ -40,10 +40,11 @@ def farm(
 ) -> list[str]:
     """Write a clip's run as an Open Job Description bundle into the folder ``out``; return it as shell commands.
 
-    ``results`` is where the results will lie (left out: ``results`` in ``out``); ``plan`` names the plan where it does
-    not lie beside the footage; ``pieces``: into how many the run is cut (left out: by its length); ``words`` are other
-    options of the command ``normals``, as one types them. Without ``out`` nothing is written. Raises UsageError where
-    an output exists or no place is named, and PsvideoError where clip or rig cannot be used.
+    ``rig`` says where the lights are (left out: rig.toml beside the footage), ``results`` where the results will lie
+    (left out: ``results`` in ``out``); ``plan`` names the plan where it does not lie beside the footage; ``pieces``:
+    into how many the run is cut (left out: by its length); ``words`` are other options of the command ``normals``, as
+    one types them. Without ``out`` nothing is written. Raises UsageError where an output exists or no place is named,
+    and PsvideoError where clip or rig cannot be used.
     """
     folder = path_if_given("out", out)
     if pieces is not None and pieces < 1:

@@ -51,7 +51,7 @@ MOST_AVERAGED = 64
 def normals(
     clip: Path | str,
     *,
-    rig: Path | str,
+    rig: Path | str | None = None,
     out: Path | str,
     plan: Path | str | None = None,
     timing: Path | str | None = None,
@@ -100,7 +100,7 @@ def normals(
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage.
     - ``rig``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list; or a folder of rigs, of which that
-      one is taken that is named after the clip.
+      one is taken that is named after the clip. Left out, rig.toml beside the footage.
     - ``timing``: timing.json of this clip; left out, the flashes are found from the picture. ``first_light`` names the
       light of the clip's first complete flash, for plans without a marker.
     - ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
@@ -162,8 +162,7 @@ def normals(
     >>> len(report.instants)
     2
     """
-    clip_path = path_of("clip", clip)
-    rig_path = rig_of_take(rig, clip_path)
+    clip_path, rig_given = path_of("clip", clip), path_if_given("rig", rig)
     going_on = resume or piece is not None
     output = Output(folder=path_of("out", out), force=force, resume=going_on, start_number=start_number, caller=caller)
     output.check()
@@ -189,6 +188,9 @@ def normals(
     delivery = _delivery(asked, caller)
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
+    rig_path = rig_of_take(rig_given, clip_path)
+    if rig_given is None:
+        caller.say(f"The lights stand where {rig_path} says.")
     rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)

@@ -12,6 +12,7 @@ import numpy as np
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_of
 from psvideo.formats.plan_toml import PLAN_FILE, format_plan
+from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import not_written, refuse_existing
 from psvideo.formats.whole_folders import whole_folder
@@ -140,7 +141,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
     )
     clipped = [_record(stage, folder, n, image) for n, image in zip(kept, light, strict=True)]
     (folder / PLAN_FILE).write_text(format_plan(claimed_plan(scene)), encoding="utf-8")
-    (folder / "rig.toml").write_text(format_rig(stage.rig), encoding="utf-8")
+    (folder / RIG_FILE).write_text(format_rig(stage.rig), encoding="utf-8")
     no_plane = stage.rig.plane is None and any(light.position_m is not None for light in stage.rig.lights)
     write_timing(folder / "truth", plan, flashes, truth.plates)
     write_scene_truth(folder / "truth", scene, plan, clock, max(clipped), traced)

@@ -23,10 +23,10 @@ OF_THE_FARM = {
 
 def farm(
     clip: ClipPath,
-    rig: RigPath,
     options: Annotated[
         list[str] | None, typer.Argument(metavar="-- OPTIONS", help="After --: other options of psvideo normals.")
     ] = None,
+    rig: RigPath = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="The folder of the job to write.")] = None,
     results: Annotated[
         Path | None, typer.Option("--results", help="Where to write results; left out: results/ in the job's folder.")

@@ -28,9 +28,9 @@ from psvideo.model.units import counted
 def normals(
     context: typer.Context,
     clips: ClipPaths,
-    rig: RigPath,
-    out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
     *,
+    rig: RigPath = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
     words: ClipWords,
     timing: TimingPath = None,
     solving: SolvingWords,

@@ -24,10 +24,11 @@ FirstLight = Annotated[
     ),
 ]
 RigPath = Annotated[
-    Path,
+    Path | None,
     typer.Option(
         "--rig",
-        help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list; or a folder of rigs, named after the takes.",
+        help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list; or a folder of rigs, named after the takes; "
+        "left out: rig.toml beside the footage.",
     ),
 ]
 OrderRig = Annotated[

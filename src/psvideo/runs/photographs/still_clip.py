@@ -13,6 +13,7 @@ from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.formats.plan_toml import PLAN_FILE, format_plan
+from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.camera import Camera
@@ -23,7 +24,7 @@ from psvideo.runs.photographs.still_doubts import curve_doubt, dark_doubt, expos
 from psvideo.runs.photographs.still_rig import KnownLights, lens_stated
 from psvideo.solve.instants import Instant
 
-RIG, LP = "rig.toml", "lights.lp"
+RIG, LP = RIG_FILE, "lights.lp"
 SETUP = "setup"
 """The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
 SAME_FOCAL = 0.001
