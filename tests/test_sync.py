@@ -20,6 +20,7 @@ from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
 from psvideo.runs.sync import sync
 from psvideo.sync.find import timing_from_rows
+from psvideo.sync.rowfit import kernel
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_until
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.synth import Exposure, Noise, TrueClock, expose
@@ -300,3 +301,20 @@ def test_the_fit_uses_exactly_the_row_weights(readout: float, shutter: float, ma
         for window in (slice(0, 12), slice(12, 24)):
             plain = design[window] @ np.linalg.lstsq(design[window], values[window, row], rcond=None)[0]
             np.testing.assert_allclose(rest[window, row], values[window, row] - plain, atol=1e-3)
+
+
+def test_brightnesses_of_many_lights_stay_as_sparse_as_what_frames_share() -> None:
+    """A flash shares frames with its neighbours in the cycle and with the room; its factor held a number for all."""
+    lights, frames = 40, 100
+    rng = np.random.default_rng(1)
+    design = np.zeros((frames, lights + 1))
+    design[:, 0] = 1.0
+    for n in range(frames):
+        for m in range(2):
+            design[n, 1 + (n + m) % lights] = rng.random()
+    value, normal, right = rng.random(frames), np.empty((lights + 1, lights + 1)), np.empty(lights + 1)
+    kernel.fit_window(value, np.ones(frames), design, 0, frames, normal, right)
+    factor = np.tril(normal)
+    np.testing.assert_allclose(right, np.linalg.lstsq(design, value, rcond=None)[0], atol=1e-3)
+    np.testing.assert_allclose(factor.T @ factor, design.T @ design, rtol=1e-5, atol=1e-9)
+    assert np.count_nonzero(factor) < 5 * (lights + 1)

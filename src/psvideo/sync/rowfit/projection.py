@@ -21,12 +21,13 @@ MOST_LEVERAGE = 0.9
 def leverage(normal: Doubles, design: Doubles, weight: float, size: int, solved: Doubles) -> float:
     """Return which share of a sample's own error the brightnesses that are fitted to it take up."""
     taken = 0.0
-    for i in range(size):
-        left = design[i]
-        for m in range(i):
-            left -= normal[i, m] * solved[m]
-        solved[i] = left / normal[i, i]
+    solved[:] = design
+    for i in range(size - 1, -1, -1):
+        solved[i] /= normal[i, i]
         taken += solved[i] ** 2
+        if solved[i] != 0.0:
+            for m in range(i):
+                solved[m] -= normal[i, m] * solved[i]
     return min(weight * taken, MOST_LEVERAGE)
 
 
