@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from live_shots import LIVE_ROWS, apart_rows, plates_of, shoot, taken
+from live_shots import LIVE_ROWS, apart_rows, plates_of, profiles_of, shoot, taken
 from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
@@ -21,10 +21,9 @@ from psvideo.live.following.phase_filter import Measured, smoothed
 from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
-from psvideo.model.rows.row_profiles import collect
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
-from psvideo.synth import Exposure, TrueClock
+from psvideo.synth import TrueClock
 from psvideo.synth.lamps.true_flashes import TrueFlash
 
 PlanMaker = Callable[..., Plan]
@@ -40,10 +39,6 @@ class Followed:
     @property
     def timing(self) -> Timing:
         return timing_of([self.follower], clip="clip")
-
-
-def profiles_of(shot: Exposure) -> Doubles:
-    return collect(MemoryFrame(n, image) for n, image in enumerate(shot.frames))[1]
 
 
 def followed(plan: Plan, values: Doubles) -> Followed:

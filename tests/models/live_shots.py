@@ -9,6 +9,7 @@ from psvideo.live.chain import Chain
 from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
+from psvideo.model.rows.row_profiles import collect
 from psvideo.model.timing import Timing
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
@@ -30,6 +31,11 @@ def shoot(plan: Plan, *, frames: int = FRAMES, clock: TrueClock | None = None, *
     clock = clock or TrueClock(phase_s=0.0123, offset_ppm=30.0)
     noise = Noise(full_well_e=20_000, read_e=8)
     return expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, **options)  # type: ignore[arg-type]
+
+
+def profiles_of(shot: Exposure) -> Doubles:
+    """Return the row profiles of a shot's frames, (frame, row)."""
+    return collect(MemoryFrame(n, image) for n, image in enumerate(shot.frames))[1]
 
 
 def taken(chain: Chain, images: Sequence[np.ndarray]) -> Chain:

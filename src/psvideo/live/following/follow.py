@@ -145,9 +145,9 @@ class Follower:
         if self.state == "locked":
             at_s = float(rows.frame_start_s.mean())
             shift_s, error_s = late_by(self.plan, rows, beat, rest)
-            error_s *= float(np.sqrt(len(rows.value) / new))
-            self.measured.append(Measured(at_s=at_s, late_s=self._late_s(at_s) + shift_s, error_s=error_s))
-            self.phase = self.phase.corrected(at_s, shift_s, error_s)
+            one = Measured(at_s=at_s, late_s=shift_s, error_s=error_s * float(np.sqrt(len(rows.value) / new)))
+            self.measured.append(replace(one, late_s=self._late_s(at_s) + shift_s))
+            self.phase = self.phase.corrected(one)
         self._learn(rows)
 
     def _no_hole(self) -> bool:

@@ -70,8 +70,11 @@ class Trims:
 
 
 def trimmed(phase: PhaseFilter, trims: Trims, at_s: float, ppm: float, *, since_s: float) -> PhaseFilter:
-    """Note a trim and return the filter with it, less sure by what its moment may be wrong."""
+    """Note a trim and return the filter with it, less sure by what its moment may be wrong.
+
+    Of a strobe that is held no drift is estimated: where its dark row stands between two frames these show hardly
+    anything, and moments that were a little wrong would be taken for a drift that carries the clock away.
+    """
     doubt_s = 1e-6 * (ppm - trims.now_ppm) * LATENCY_S
     trims.add(at_s, ppm)
-    covariance = phase.covariance + np.diag([doubt_s**2, 0.0])
-    return replace(phase, clock=trims.bent(phase.clock, since_s=since_s), covariance=covariance)
+    return replace(phase.less_sure(doubt_s).without_drift(), clock=trims.bent(phase.clock, since_s=since_s))
