@@ -58,6 +58,38 @@ def test_dark_frames_before_the_strobe_starts_are_counted_alike_by_numbers_and_b
     hold_together(make_plan(width_px=8, height_px=96), list(range(110)), dark=dark)
 
 
+@pytest.mark.parametrize("again", [(70,), (71, 90), (70, 70), (80, 80, 80)])
+def test_a_frame_that_a_camera_repeats_after_the_lock_is_recognised_and_costs_no_new_lock(
+    make_plan: PlanMaker, again: tuple[int, ...]
+) -> None:
+    course = sorted([*range(130), *again])
+    chain = hold_together(make_plan(width_px=8, height_px=96), course)
+    twice = [number for number in range(1, len(course)) if course[number] == course[number - 1]]
+    timing = followed_timing(chain, clip="clip", first_number=FIRST)
+    assert timing.repeated_frames == tuple(number + FIRST for number in twice)
+    assert (timing.dropped_frames, chain.lost_frames, len(chain.followed)) == ((), 0, 1)
+
+
+@pytest.mark.parametrize("instead", [(70,), (70, 71), (60, 90)])
+def test_a_frame_that_is_sent_again_instead_of_one_that_was_lost_is_repeated_and_that_one_missing(
+    make_plan: PlanMaker, instead: tuple[int, ...]
+) -> None:
+    """A grabber that lost a frame hands out the one before it a second time, and counts on."""
+    course = list(range(130))
+    for at in instead:
+        course[at] = course[at - 1]
+    chain = hold_together(make_plan(width_px=8, height_px=96), course)
+    timing = followed_timing(chain, clip="clip", first_number=FIRST)
+    assert timing.repeated_frames == tuple(at + FIRST for at in instead)
+    assert (chain.lost_frames, len(chain.followed)) == (len(instead), 1)
+
+
+def test_a_camera_that_hangs_and_sends_one_picture_for_ever_is_lost(make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=8, height_px=96)
+    frames = list(shoot(plan, frames=100).frames)
+    assert taken(Chain(plan=plan), [*frames, *[frames[-1]] * 60]).state == "lost"
+
+
 def test_a_repeated_frame_and_missing_ones_are_told_apart(make_plan: PlanMaker) -> None:
     course = [at for at in sorted([*range(140), 15]) if at not in (60, 90)]
     chain = hold_together(make_plan(width_px=8, height_px=96), course)

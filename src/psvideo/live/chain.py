@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from psvideo.live.following.catching_up import caught_up
 from psvideo.live.following.follow import Follower, State
 from psvideo.live.following.history import timing_now
@@ -15,6 +17,7 @@ from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.ring import Ring, RingFrame, ring_of
 from psvideo.live.showing.newest_result import NewestResults, NewestRound
 from psvideo.live.showing.smaller import Smaller
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.rows.row_profiles import LOST, row_light
@@ -49,6 +52,7 @@ class Chain:
     _seeking: Seeking = field(init=False)
     _ring: Ring = field(init=False)
     _results: NewestResults = field(init=False)
+    _before: tuple[LiveFrame, Doubles] | None = None
     _guard: threading.RLock = field(default_factory=threading.RLock)
 
     def __post_init__(self) -> None:
@@ -75,7 +79,8 @@ class Chain:
         """Take in one more frame."""
         value, clipped = row_light(frame.coded)
         doubt = LOST * clipped if clipped.any() else None
-        profile = NumberedProfile(number=frame.index, value=value, doubt=doubt)
+        profile = NumberedProfile(number=frame.index, value=value, doubt=doubt, same=self._is_same(frame, value))
+        self._before = frame, value
         small = Smaller(step=self.step, cfa=self.cfa).of(frame.coded)
         with self._guard:
             self.count = self.count.after(frame)
@@ -113,11 +118,17 @@ class Chain:
             timing = timing_now(follower, (min(frames), max(frames)))
         return self._results.of(frames, timing, rig=self.rig, step=step)
 
+    def _is_same(self, frame: LiveFrame, value: Doubles) -> bool:
+        """Return whether a frame has the codes of the one before; ``value`` are its row means."""
+        if self._before is None or not np.array_equal(value, self._before[1]):
+            return False
+        return np.array_equal(np.asarray(frame.coded.codes), np.asarray(self._before[0].coded.codes))
+
     def _follow(self, follower: Follower, profile: NumberedProfile) -> int:
         """Follow one more frame and return its place in time; frames in the ring are moved where it shows that."""
         places, before = follower.places, follower.state
-        place = follower.add(profile.number, profile.value, profile.doubt)
-        later = follower.places.late - places.late
+        place = follower.add(profile.number, profile.value, profile.doubt, same=profile.same)
+        later = follower.places.missing - places.missing
         if later > 0:
             self._ring.moved_from(follower.places.holes[-1].before + places.late, later)
         elif later < 0:
@@ -170,7 +181,7 @@ class Chain:
     def _begin(self, follower: Follower, later: list[NumberedProfile], *, from_number: int) -> None:
         """Follow a new lock from a numbered frame on; frames that came ``later`` than those searched are caught up."""
         for one in later:
-            follower.add(one.number, one.value, one.doubt)
+            follower.add(one.number, one.value, one.doubt, same=one.same)
         if follower.state == "lost":
             self._look_behind(follower)
         for before in self.followed:  # what it took for missing in the frames that were searched is known better

@@ -23,12 +23,16 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.seed import GOOD_SEED
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.tracking.steps_ahead import LEAST
 
 State = Literal["seeking", "locked", "unsure", "lost"]
 EVERY = 8
 """Frames between two corrections of the clock."""
 LOOKED = 3
 """Frames that were not predicted until others are taken for missing before them."""
+MOST_REPEATS = -LEAST
+"""Frames in a row that may all show the moment of the one before them, as the finder has it: more are a still picture.
+"""
 ASTRAY, LEAST_ASTRAY_ROWS = 8.0, 0.1
 """A strobe that stands by more standard errors, and more rows, from where its clock has it is another one: one that was
 started again. Where frames are missing it stands within 2 errors, else hardly ever within 15."""
@@ -58,6 +62,7 @@ class Follower:
     _seen: SeenShare = field(default_factory=SeenShare)
     _odd: list[int] = field(default_factory=list)
     _fresh: int = 0
+    _repeats: int = 0
 
     @property
     def clock(self) -> FoundClock:
@@ -88,14 +93,18 @@ class Follower:
         since_s = self.window.frames[0].place * self.window.period_s if self.window.frames else at_s
         self.phase = trimmed(self.phase, self.trims, at_s, ppm, since_s=since_s)
 
-    def add(self, number: int, value: Doubles, doubt: Doubles | None = None) -> int:
+    def add(self, number: int, value: Doubles, doubt: Doubles | None = None, *, same: bool = False) -> int:
         """Take in a frame by the source's number and return its place in time; ``value`` (row,) is its profile.
 
-        A frame that comes twice is left out.
+        ``same``: its codes are those of the frame before. A frame that comes twice is left out.
         """
         place = self.places.place_of(number)
         if self.window.frames and place <= self.window.frames[-1].place:
             return place
+        if same and self._is_repeat(place):
+            self._repeats += 1
+            self.places = self.places.with_repeats(number)
+            return self.window.frames[-1].place
         self.window.add(HeldFrame(place=place, value=value, doubt=doubt))
         self.span = (place if self.span is None else self.span[0], place)
         self._fresh += 1
@@ -105,9 +114,27 @@ class Follower:
             self._correct()
         return self.window.frames[-1].place
 
+    def _is_repeat(self, place: int) -> bool:
+        """Return whether a frame of the same codes as the one before was sent twice: that one was foretold, and is not
+        what is foretold of this place. Where nothing is lit frames may be the same, and time goes on."""
+        if self.state != "locked" or self._learnt is None or self._repeats >= MOST_REPEATS:
+            return False
+        before = self.window.frames[-1].place
+        if before != place - 1 or before in self._odd:
+            return False
+        here = replace(self.window.profiles(1), index=np.array([place]))
+        return self._learnt.are_odd(self._learnt.losses(here, self._beat_now))
+
     def _hold_against_foretold(self, learnt: Learnt) -> None:
-        """Look for missing frames where the latest were not predicted, and else take the light for changed."""
-        latest = self.window.profiles(1)
+        """Look for missing frames where the latest were not predicted, and else take the light for changed.
+
+        A frame that was sent again may stand for another that was lost: then one is missing right after it.
+        """
+        latest, repeats = self.window.profiles(1), self._repeats
+        self._repeats = 0
+        if repeats and (lost := learnt.missing_before(latest, self._beat_now, most=repeats)):
+            self._miss(int(latest.index[0]), lost)
+            return
         if not learnt.are_odd(learnt.losses(latest, self._beat_now)):
             self._odd = self._odd[-LOOKED:] if self._odd and latest.index[0] - self._odd[-1] < LOOKED else []
             return
@@ -117,11 +144,15 @@ class Follower:
         first = self._odd[0]
         missing = learnt.missing_before(self.window.profiles(self.window.count_from(first)), self._beat_now)
         if missing:
-            self._moved(first, missing, self.places.with_hole(first - self.places.late, missing))
-            self._odd = []
+            self._miss(first, missing)
         elif not self.window.changes or first - self.window.changes[-1] > EVERY:
             self.window.changes.append(first)
             self._doubt(first)
+
+    def _miss(self, first: int, count: int) -> None:
+        """Take frames for missing before the one at the place ``first``."""
+        self._moved(first, count, self.places.with_hole(first - self.places.late, count))
+        self._odd = []
 
     def _moved(self, first: int, by: int, places: FramePlaces) -> None:
         """Put the frames from the place ``first`` on by so many places later."""

@@ -53,9 +53,10 @@ class Learnt:
         """Return whether rows hardly change, against what they did when brightnesses were learnt."""
         return float(rows.value.std(axis=0).max()) < NOTHING * float(self.frames.spread.max())
 
-    def missing_before(self, rows: Profiles, beat: Beat) -> int:
-        """Return how many frames are missing before some that are odd, 0 where that explains nothing."""
-        tried = [replace(rows, index=rows.index + extra) for extra in range(MOST_MISSING + 1)]
+    def missing_before(self, rows: Profiles, beat: Beat, *, most: int = MOST_MISSING) -> int:
+        """Return how many frames, at most so many, are missing before some that are odd, 0 where that explains
+        nothing."""
+        tried = [replace(rows, index=rows.index + extra) for extra in range(most + 1)]
         losses = np.array([self.losses(one, beat).mean() for one in tried])
         best = int((losses + STEP_COST * np.arange(len(losses))).argmin())
         return best if losses[best] < min(self.usual, losses[0] - SUSPICIOUS) + SUSPICIOUS else 0

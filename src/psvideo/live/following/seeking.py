@@ -15,11 +15,15 @@ from psvideo.model.plan import Plan
 
 @dataclass(frozen=True, kw_only=True)
 class NumberedProfile:
-    """One frame by the source's number: its row means (row,), and by how much these may be wrong (None: not)."""
+    """One frame by the source's number: its row means (row,), and by how much these may be wrong (None: not).
+
+    ``same``: its codes are those of the frame before.
+    """
 
     number: int
     value: Doubles
     doubt: Doubles | None = None
+    same: bool = False
 
 
 def _set() -> threading.Event:
