@@ -76,6 +76,9 @@ def off_rows(plan: Plan, timing: Timing, fired: tuple[TrueFlash, ...], frames: i
         pytest.param(3, 0.25, 0.83, 73, 13.82, 17.64, 876, id="more-dark-frames-than-places"),
         pytest.param(3, 1.0, 0.78, 64, 30.11, 34.93, 15, id="three-dark-repeats"),
         pytest.param(4, 0.5, 0.45, 71, 39.09, 43.08, 889, id="two-dark-repeats"),
+        pytest.param(3, 0.25, 0.49, 49, 13.99, 17.64, 203, id="dark-for-three-frames"),
+        pytest.param(4, 0.5, 0.94, 64, 15.98, 19.42, 34, id="other-lights"),
+        pytest.param(6, 1.0, 0.42, 56, 16.25, 18.81, 515, id="one-dead-flash"),
     ],
 )
 def test_flashes_beside_a_break_are_complete_only_where_they_fired(

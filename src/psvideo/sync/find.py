@@ -28,8 +28,9 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.moved_at_breaks import between_lone_ends, moved_at_breaks
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.restarts import may_restart, odd_somewhere
+from psvideo.sync.rowfit.restarts import dark_within, may_restart, odd_somewhere
 from psvideo.sync.rowfit.tracking.course import window_frames
+from psvideo.sync.silent import silent
 from psvideo.sync.turns import turns
 from psvideo.sync.unbroken import unbroken
 from psvideo.sync.unfired import incomplete, only_fired, remarks_on_unfired, unfired_of
@@ -111,9 +112,9 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
 
     Six ways out, the first that holds; the first five with a fit of the whole clip that is believed:
 
-    1. It fits everywhere, and no frames are missing (``may_restart``): one clip.
-    2. It fits by missing frames, but the strobe moved by what they do not explain (``moved_at_breaks``): the parts
-       between those breaks.
+    1. It fits everywhere, no frames are missing (``may_restart``), and none lie in the dark amid others: one clip.
+    2. It fits by missing frames or across a pause, but the strobe moved by what they do not explain
+       (``moved_at_breaks``): the parts between those breaks. Where it did not, and there is only the pause: one clip.
     3. Missing frames part a frame or two at an end from the others, as where the strobe stopped within a frame: the
        parts that are found among the others.
     4. No parts are found by themselves, but for one beside the dark, and the whole fits no frames worse than others:
@@ -123,11 +124,14 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
        fit that is believed or refused.
     """
     whole, believed = verdict.found, verdict.believed
-    if believed and not may_restart(plan, rows, whole):
+    may = may_restart(plan, rows, whole)
+    if believed and not may and not dark_within(whole):
         return []
-    apart = found_apart(plan, rows, moved_at_breaks(plan, whole)) if believed else []
+    apart = found_apart(plan, rows, moved_at_breaks(plan, whole, silent(plan, whole))) if believed else []
     if len(apart) > 1:
         return apart
+    if believed and not may:
+        return []
     inner = between_lone_ends(whole) if believed else None
     within = found_within(plan, rows, inner) if inner else []
     if within:

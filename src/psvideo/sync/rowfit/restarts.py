@@ -54,6 +54,12 @@ def may_restart(plan: Plan, rows: Profiles, found: ClipFit) -> bool:
     return odd_somewhere(found)
 
 
+def dark_within(found: ClipFit) -> bool:
+    """Return whether frames that no flash lights stand between others: the strobe may go on elsewhere after them."""
+    lit = np.flatnonzero(~found.unlit)
+    return bool(found.unlit[lit[0] : lit[-1]].any())
+
+
 def odd_somewhere(found: ClipFit) -> bool:
     """Return whether a fit leaves much more in some frames in a row than in most."""
     loss = frame_losses(found.rows, found.fit.rest)
