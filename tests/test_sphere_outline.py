@@ -1,13 +1,18 @@
 """A mirror's outline in rooms that it mirrors: windows along the rim, stands, blur, noise; the truth is known."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from bench.mirror_rooms import Panel, Room, film, random_room
 from bench.mirror_scene import Ball, Lamp, Lens
 
 from psvideo.calibrate.light_pictures import light_pictures
-from psvideo.calibrate.sphere.outline import Outline, find_outlines
+from psvideo.calibrate.sphere.outline import SAME, Outline, find_outlines
+from psvideo.calibrate.sphere.rim_fit import Rim, fit_rim
+from psvideo.calibrate.sphere.rim_model import Surface
 from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.model.arrays import Doubles, Floats
 
 LENS = Lens(width=190, height=190, focal=800.0)
 BALL = Ball(centre=(0.01, -0.006, -0.6), radius_m=0.045)
@@ -68,3 +73,20 @@ def test_the_rooms_edges_that_a_ball_mirrors_within_its_rim_do_not_pass_for_the_
     away = np.abs(found.place[:3] - [x, y, radius_px])
     assert away.max() < 0.7
     assert (away < 2 * np.sqrt(np.diag(found.covariance)[:3])).all()
+
+
+def test_an_outline_that_was_refused_is_not_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a ball that the picture's edge cuts in half, every picture's round things lead to the same outline."""
+    places: list[np.ndarray] = []
+
+    def noted(pictures: Sequence[Floats], view: SphereView, around: Doubles, *, surface: Surface) -> Rim | None:
+        places.append(around)
+        return fit_rim(pictures, view, around, surface=surface)
+
+    monkeypatch.setattr("psvideo.calibrate.sphere.outline.fit_rim", noted)
+    cut = Ball(centre=(0.066, 0.0, -0.6), radius_m=0.045)
+    pictures = light_pictures("abc", film(LENS, cut, LAMPS, ROOMS["chrome before a bright wall"], seed=0))
+    assert find_outlines(pictures, SphereView(focal_px=LENS.focal, principal_px=(94.5, 94.5))) == []
+    apart = [np.abs(one - other)[:3].max() for n, one in enumerate(places) for other in places[:n]]
+    assert len(places) > 0
+    assert min(apart, default=np.inf) > SAME * 50

@@ -109,9 +109,14 @@ def find_outlines(
     seen = _telling(pictures, shown)
     guesses = sorted(_guesses(seen, view, surface), key=lambda guess: guess.evidence, reverse=True)
     chosen: list[Rim] = []
+    tried: list[Doubles] = []
     for guess in guesses:
-        if len(chosen) < count and all(apart(guess.place, other.place) for other in chosen):
-            best = _bettered(guess, seen, view, surface)
+        taken = len(chosen) == count or not all(apart(guess.place, other.place) for other in chosen)
+        if taken or _is_one_of(guess.place, tried):
+            continue
+        best = _bettered(guess, seen, view, surface)
+        if not _is_one_of(best.place, tried):
+            tried.append(best.place)
             fit = fit_rim(shown, view, best.place, surface=surface)
             chosen += [fit] if fit is not None and _sure(fit) else []
     return [_outline(view, fit) for fit in chosen]
@@ -153,10 +158,15 @@ def _guesses(seen: Sequence[Floats], view: SphereView, surface: Surface) -> list
     for picture in seen:
         for thing in round_things(_logarithm(picture), count=CANDIDATES):
             around = given_outline(view, (thing.x, thing.y, thing.radius)).place
-            if all(np.abs(guess.place - around)[:3].max() > SAME * guess.place[2] for guess in guesses):
+            if not _is_one_of(around, [guess.place for guess in guesses]):
                 guess = seek_rim(seen, view, around, surface=surface)
                 guesses += [guess] if guess is not None else []
     return guesses
+
+
+def _is_one_of(place: Doubles, tried: Sequence[Doubles]) -> bool:
+    """Return whether an outline (5,) is as good as one that was tried."""
+    return any(np.abs(one - place)[:3].max() <= SAME * one[2] for one in tried)
 
 
 def _bettered(guess: RoughOutline, seen: Sequence[Floats], view: SphereView, surface: Surface) -> RoughOutline:
