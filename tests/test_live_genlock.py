@@ -39,7 +39,7 @@ from psvideo.strobe.link.lines import Error
 from psvideo.strobe.link.requests import Trim
 from psvideo.strobe.runlog import RunLog, as_played, format_log
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
-from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.sync.rowfit.beat import FoundClock, train_between
 
 PlanMaker = Callable[..., Plan]
 HOLDS_ROWS = 2.0
@@ -300,6 +300,26 @@ def test_a_trim_costs_the_same_after_an_hour_as_in_the_first_minute() -> None:
     for number in range(150, 3000):
         trims.add(0.1 * number, float(number * 37 % 2000 - 1000))
     assert least_cost_s(3000) < 5 * early_s
+
+
+def test_the_flashes_of_a_moment_are_as_few_after_hours_of_trims_as_before(make_plan: PlanMaker) -> None:
+    """Hours of trims have it flash many cycles sooner or later, and no more flashes lie between two frames for that."""
+    plan, trims = held_plan(make_plan), Trims()
+    rng = np.random.default_rng(2)
+    for at_s in np.arange(0, 7200, 5.0).tolist():
+        trims.add(at_s, float(rng.normal(-900, 300)))
+    clock = trims.bent(FoundClock(phase_s=0.01, offset_ppm=1300.0), since_s=7190.0)
+    cycle = len(plan.cycle_slots)
+    every = plan.train(0, cycle * int(7220 / plan.cycle_s))
+    straight_s = clock.phase_s + every.start_s * clock.rate
+    true_s = straight_s + clock.bend(straight_s)
+    assert abs(true_s[-1] - straight_s[-1]) > 10 * plan.cycle_s
+    train = train_between(plan, clock, 7195.0, 7195.1)
+    within = true_s[(true_s > 7195.0) & (true_s < 7195.1)]
+    assert len(train.start_s) <= 4 * cycle, "the one or two around the moment, and one more at either end"
+    assert all(np.abs(train.start_s - one).min() < 1e-9 for one in within)
+    assert train.start_s[0] < 7195.0 - 0.5 * plan.cycle_s
+    assert train.start_s[-1] > 7195.1 + 0.5 * plan.cycle_s
 
 
 def test_frames_do_not_wait_for_the_boards_answer_to_a_trim(make_plan: PlanMaker) -> None:

@@ -7,6 +7,9 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import FlashTrain, Plan
 
+UNBENT_STEPS = 5
+"""Of bends by 2 % of the time, the most that a board can be trimmed by, they leave nothing of an hour."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class FoundClock:
@@ -49,6 +52,17 @@ class FoundClock:
             inside = inside + slope[-1] * np.maximum(time_s - knot_s[-1], 0.0)
         return inside
 
+    def unbent_s(self, at_s: float) -> float:
+        """Return the time on the unbent clock of what comes at a time on this one: ``bend`` reversed.
+
+        However far a clock is bent by hours of a strobe that follows the camera, it is bent by a small share of each
+        second, and every step leaves that share of the error.
+        """
+        unbent_s = at_s
+        for _ in range(UNBENT_STEPS if self.knot_s else 0):
+            unbent_s = at_s - float(self.bend(np.array([unbent_s]))[0])
+        return unbent_s
+
     def mean_offset_ppm(self) -> float:
         """Return the offset that fits the whole clip best, bends included."""
         if len(self.knot_s) < 2:
@@ -87,9 +101,8 @@ def train_between(plan: Plan, clock: FoundClock, from_s: float, until_s: float) 
     """Return the flashes between two times, and at least a cycle more at either end, on the camera's clock."""
     cycle = len(plan.cycle_slots)
     cycle_s = plan.cycle_s * clock.rate
-    slack = 1 + int(np.ceil(max(map(abs, clock.bend_s), default=0.0) / cycle_s))
-    begin = int(np.floor((from_s - clock.phase_s) / cycle_s)) - slack
-    end = int(np.ceil((until_s - clock.phase_s) / cycle_s)) + slack
+    begin = int(np.floor((clock.unbent_s(from_s) - clock.phase_s) / cycle_s)) - 1
+    end = int(np.ceil((clock.unbent_s(until_s) - clock.phase_s) / cycle_s)) + 1
     train = plan.train(begin * cycle, (end - begin) * cycle)
     straight_s = clock.phase_s + train.start_s * clock.rate
     ends_s = straight_s + train.duration_s * clock.rate
