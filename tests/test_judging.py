@@ -202,7 +202,7 @@ def test_a_matte_bust_is_trusted_hair_and_creases_included() -> None:
 
 
 def test_a_small_picture_is_trusted_as_a_large_one_is_beside_the_edges_of_shadows() -> None:
-    case, reached = bust((0, 1, 2, 3, 4), width_px=192)
+    case, reached = bust((0, 1, 2, 3, 4), width_px=256)
     surface = Solving(error=True).solve(case.plates, case.lit)
     errors = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(surface.normals - case.truth, axis=-1) / 2, 0, 1)))
     reached &= np.linalg.norm(case.truth, axis=-1) > 0.5

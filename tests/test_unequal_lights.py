@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from bench.accuracy_measure import angles_deg
+from bench.predicted import shapes
 from numpy.typing import NDArray
 from ring_and_ball import ball, ring
 
@@ -79,3 +81,21 @@ def test_a_measurement_counts_from_one_level_on_whatever_its_light(module: objec
     usable = Usable(dark_level=0.01, shadow_ratio=0.0)
     surface = module.solve(plates, lit, usable=usable)  # type: ignore[attr-defined]
     np.testing.assert_array_equal(surface.normals.any(axis=-1)[0], levels > 0.01)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.002])
+@pytest.mark.parametrize(
+    "strengths", [(1, 0.1, 1, 0.1, 1), (1, 1, 1, 0.1, 0.1), (1, 0.1, 1, 0.1, 1, 0.1, 1, 0.1)], ids=str
+)
+def test_what_weak_lamps_hold_of_noise_is_claimed_once(strengths: tuple[float, ...], noise: float) -> None:
+    """Residuals of a weak lamp are noise: they say nothing of normals that strong lamps show."""
+    normals = shapes()[1][1]
+    images, directions, _ = shot(np.array(strengths), normals, noise=noise)
+    surface = ps.solve_images(images, directions, intensities=np.array(strengths))
+    assert surface.error_deg is not None
+    off_deg = angles_deg(surface.normals, normals)
+    assert (off_deg <= surface.error_deg).mean() >= 0.65
+    assert np.median(surface.error_deg) < 2 * np.median(off_deg)
+    fitted = np.linalg.lstsq(directions * np.array(strengths)[:, None], images.reshape(len(images), -1), rcond=None)[0]
+    best_deg = angles_deg(fitted.T.reshape(normals.shape), normals)
+    assert off_deg.mean() < 1.15 * best_deg.mean(), "noise is alike under all lamps: plain least squares is best"

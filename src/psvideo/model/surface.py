@@ -48,6 +48,8 @@ class Misfit:
     distance_share: the share of the subject where near lights' distance is known so little that a normal may be turned
         too far for it to be trusted; such places say nothing of ``error_deg``.
     reflectance: what the subject shows beyond n . l, None where that explains little.
+    sigmas: how far off each light's measurements are, over those of a light of mean strength; empty where the noise is
+        not known.
     """
 
     share: float
@@ -55,6 +57,7 @@ class Misfit:
     noise_deg: float = 0.0
     distance_share: float = 0.0
     reflectance: Reflectance | None = None
+    sigmas: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,8 @@
 ``solving`` chooses the solver and calls it: begin there. All solvers take the same values: the lights
 (``illumination``), plates and lights as plain arrays (``task``), surfaces too (``surface_bits``), shared between
 threads in bands of rows (``bands``), and how noisy plates are (``plate_noise``), by what neighbours and samples farther
-apart show (``noise_samples``). ``evidence`` keeps one round together for what looks at it again.
+apart show (``noise_samples``); ``light_sigmas`` says how lights of unlike strength are weighed for it. ``evidence``
+keeps one round together for what looks at it again.
 
 Rooms, from the bottom up:
 

@@ -85,6 +85,7 @@ class Task(NamedTuple):
     origin: Floats  # (3,): what black samples would give with it, to be added
     least: np.float32  # the smallest 1 / intensity
     most: np.float32  # the largest
+    noise: Floats  # (light, 2): the noise variance of a dark measurement, and per unit of light; 0 where not known
     dark: Floats  # (light,): a measurement counts where it is above this,
     ratio: np.float32  # and, relative to the intensity, above this times the pixel's mean
     condition_squared: np.float32  # largest trace(A) * trace(A^-1) of the usable lights' normal equations
@@ -120,8 +121,6 @@ class Weights(NamedTuple):
     contradiction: np.float32
     most_error_deg: np.float32
     common: np.float32
-    read: np.float32  # the noise variance of a dark measurement, and per unit of light; 0 where noise is not known
-    photon: np.float32
     curve: np.float32  # what the subject reflects beyond n . l: the numbers of reflectance.Reflectance, in g's unit
     rough: np.float32
     broad: np.float32
@@ -206,6 +205,7 @@ def task(
         near=_near(lit, unit, copies, rows, cols),
         least=np.float32((unit / strength).min()),
         most=np.float32((unit / strength).max()),
+        noise=np.zeros((len(plates) + copies, 2), np.float32),
         dark=_filled(max(usable.dark_level, _NO_LIMIT) * lit.noisiness, copies, mode="edge"),
         ratio=np.float32(max(usable.shadow_ratio, _NO_LIMIT)),
         condition_squared=np.float32(max(PIXEL_CONDITION**2, 1.001 * frobenius)),

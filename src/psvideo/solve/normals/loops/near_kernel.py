@@ -74,7 +74,7 @@ def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
             lent(near.positions), lent(near.is_near), lent(near.axes), lent(near.anisotropy), lent(near.strengths),
             lent(near.depth), lent(near.pinhole),
         ),
-        lent(task.inverse), lent(task.origin), task.least, task.most, lent(task.dark),
+        lent(task.inverse), lent(task.origin), task.least, task.most, lent(task.noise), lent(task.dark),
         task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Floats, Indices
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.robust.equations import SENT, add_equations, solve_equations
+from psvideo.solve.normals.robust.equations import add_equations, solve_equations
 from psvideo.solve.normals.task import LIGHTS, Task
 
 EXPLAINED_SQUARED = np.float32(4.5**2)  # of eight measurements, noise spoils none in 9999 of 10,000 pixels
@@ -30,24 +30,22 @@ def solve_plainly(task: Task, w: Floats, m: Floats, e: Floats, n: int) -> None:
 
 
 @FUSED.called
-def list_unexplained(
-    task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, listed: Indices, n: int
-) -> int:
+def list_unexplained(task: Task, w: Floats, m: Floats, listed: Indices, n: int) -> int:
     """List the pixels with a usable measurement that g does not explain to its noise, and return how many they are.
 
     All are listed where the others' measurements are farther off than noise would take so many: a surface that is not
     matte turns their normals too. (Of the noise a fit of three numbers takes its part.) All are listed as well where
     too few lights reach one of them, for shadows end there. Three measurements are always explained.
-    read, photon: the variance of a dark measurement, and what light adds to it.
     """
     w[ODD : ODD + n], w[FAR_OFF : FAR_OFF + n] = ZERO, ZERO
     for light in range(task.lights):
-        lamp = of_light(task.matrix, light)
+        lamp, per = of_light(task.matrix, light), task.per_strength[light]
+        read, photon = task.noise[light, 0], task.noise[light, 1]
         for i in range(n):
             x, y, z = at(lamp, i)
             a, b, c = w[X + i], w[Y + i], w[Z + i]
             error = m[light, i] - (x * a + y * b + z * c)
-            share = LIGHTS * v[SENT + i]
+            share = LIGHTS / at(per, i)
             variance = read + photon * max(m[light, i], ZERO) + share * share * (a * a + b * b + c * c)
             there = m[light, i] > ABSENT
             w[ODD + i] = ONE if there & (error * error > EXPLAINED_SQUARED * variance) else w[ODD + i]

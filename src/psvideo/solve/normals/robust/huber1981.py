@@ -16,19 +16,17 @@ from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import Misfit, Subject, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.light_sigmas import combined_noise
 from psvideo.solve.normals.plate_noise import PlateNoise
+from psvideo.solve.normals.robust.first_look import first_look
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.solution import Solution
-from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting, limit_deg, weights
+from psvideo.solve.normals.robust.weighing import Reweighting, limit_deg, weights
 from psvideo.solve.normals.task import Looks, Samples, Usable
 
 USABLE = Usable(shadow_ratio=0.4)
 """Least squares needs every measurement; here one that is dark beside the others may go sooner."""
-
-
-SAMPLE_PIXELS = 1 << 16
-"""What is typical of a picture is looked for in about this many pixels: whole rows, evenly spread."""
 
 
 def solve(
@@ -71,12 +69,13 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    solution = Solution.of(
-        plates, lit, seen, mask, usable, black_level, scale, half=half, residual=residual, spare=spare, threads=threads
-    )
     noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
+    solution = Solution.of(
+        plates, lit, seen, mask, usable, black_level, scale, noise,
+        half=half, residual=residual, spare=spare, threads=threads,
+    )  # fmt: skip
     if misfit is None:
-        found, misfit, step = _first_look(solution, reweighting, noise)
+        found, misfit, step = first_look(solution, lit, reweighting, noise)
         if misfit is not None and subject is None:
             points = points_of(
                 plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale, unsure=unsure
@@ -84,6 +83,8 @@ def solve(
             subject = Subject(reflectance=None if points is None else reflectance_of([points]))
         if misfit is not None and subject is not None:
             misfit = replace(misfit, reflectance=subject.reflectance)
+    if misfit is not None and misfit.sigmas:
+        solution = solution.balanced(np.array(misfit.sigmas))
     model = None if misfit is None else misfit.reflectance
     how = weights(
         reweighting,
@@ -113,9 +114,9 @@ def look(
 
     Arguments are those of ``solve``.
     """
-    solution = Solution.of(plates, lit, seen, mask, usable, 0.0, 1.0, half=False, residual=False, spare=spare)
     noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
-    found, misfit, step = _first_look(solution, reweighting, noise)
+    solution = Solution.of(plates, lit, seen, mask, usable, 0.0, 1.0, noise, half=False, residual=False, spare=spare)
+    found, misfit, step = first_look(solution, lit, reweighting, noise)
     if misfit is None:
         return None
     return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0, unsure=unsure)
@@ -123,8 +124,7 @@ def look(
 
 def _noise_of(plate_noise: PlateNoise | None, lit: Illumination) -> tuple[float, float]:
     """Return the variance of the channels' combined noise in the dark, and per unit of light; 0 where unknown."""
-    dark, light = lit.noise_shares
-    return (0.0, 0.0) if plate_noise is None else (plate_noise.read * dark, plate_noise.photon * light)
+    return (0.0, 0.0) if plate_noise is None else combined_noise(plate_noise, lit)
 
 
 def _dimmed(reweighting: Reweighting, plate_noise: PlateNoise | None) -> Reweighting:
@@ -132,32 +132,3 @@ def _dimmed(reweighting: Reweighting, plate_noise: PlateNoise | None) -> Reweigh
     if plate_noise is None:
         return reweighting
     return replace(reweighting, noise=reweighting.noise * plate_noise.dimness)
-
-
-def _first_look(
-    solution: Solution, reweighting: Reweighting, noise: tuple[float, float]
-) -> tuple[Surface, Misfit | None, int]:
-    """Solve a sample of the rows: return their surface, what is typical of the picture, and how many rows apart they
-    are."""
-    rows, cols = solution.shown.shape[:2]
-    step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
-    how = weights(reweighting, noise, most_error_deg=EVERYTHING_DEG, common=0.0)
-    solution.run(how, unexplained=unexplained, step=step)
-    found = solution.surface()
-    return found, _typical(found, unexplained.reshape(rows, cols), step), step
-
-
-def _typical(found: Surface, unexplained: Floats, step: int) -> Misfit | None:
-    """Return what is typical of the pixels in every ``step``-th row whose measurements can contradict each other.
-
-    The share is that of their brighter half, where noise counts less. None where there is no such pixel.
-    """
-    sampled = unexplained[::step]
-    known = sampled > 0
-    if found.error_deg is None or not known.any():
-        return None
-    light = np.linalg.norm(found.albedo[::step][known].astype(np.float32).reshape(int(known.sum()), -1), axis=1)
-    bright = light >= np.median(light)
-    return Misfit(
-        share=float(np.median(sampled[known][bright])), error_deg=float(np.median(found.error_deg[::step][known]))
-    )

@@ -174,12 +174,12 @@ def _solve_block(
     w, v, m = room.planes, room.more, room.measurements
     distant, modelled = task.near.depth.size == 0, room.ways.size > 0
     summed = _measure(task, room, distant, row, col, n)
-    few, known = len(m) == FEW and distant, weights.read > ZERO
+    few, known = len(m) == FEW and distant, task.noise[0, 0] > ZERO
     odd, share = n, LIGHTS if known else weights.signal_noise
     if known:
         if not summed:
             solve_plainly(task, w, m, room.errors, n)
-        odd = list_unexplained(task, weights.read, weights.photon, w, v, m, listed, n)
+        odd = list_unexplained(task, w, m, listed, n)
         v[DOUBT : DOUBT + n] = ZERO
     whole = odd > n * MOST_APART
     if whole:

@@ -1,17 +1,18 @@
 """A picture's task for the robust solver, and where its solution goes as the loops run over its rows."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.arrays import Floats, Mask
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.light_sigmas import root_sigmas
 from psvideo.solve.normals.task import (
     FEW,
     Looks,
@@ -29,9 +30,13 @@ from psvideo.solve.normals.task import (
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """A picture's task, and where its solution and ``predicted`` errors (pixel,) go as the loops run over its rows."""
+    """A picture's task, and where its solution and ``predicted`` errors (pixel,) go as the loops run over its rows.
+
+    as_it_is: the task in the plates' units; given: the same, its lights balanced.
+    """
 
     shown: ShownPlates
+    as_it_is: Task
     given: Task
     result: Result
     predicted: Samples
@@ -42,23 +47,33 @@ class Solution:
     @classmethod
     def of(
         cls, plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, seen: Mask | None, mask: Mask | None,
-        usable: Usable, black_level: float, scale: float,
+        usable: Usable, black_level: float, scale: float, noise: tuple[float, float],
         *, half: bool, residual: bool, spare: Path | None, threads: int | None = None,
     ) -> "Solution":  # fmt: skip
-        """Make room for the solution of plates; arguments are those of ``solve``."""
+        """Make room for the solution of plates; arguments are those of ``solve``, ``noise`` that of a measurement, its
+        channels combined: in the dark, and what a unit of light adds, as variances."""
         shown = ShownPlates.of(plates)
         check_arrays(shown.samples, lit, seen, mask)
         shown = shown.as_floats()  # one kind of samples, and so one loop to compile
         (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
+        as_it_is = task(shown.samples, lit, seen, mask, usable, black_level, scale)
+        read = noise[0] * lit.noisiness**2
+        noises = np.stack([read, np.full_like(read, noise[1])], axis=-1).astype(np.float32)
+        as_it_is = as_it_is._replace(noise=np.pad(noises, ((0, len(as_it_is.tone) - len(noises)), (0, 0))))
         return cls(
             shown=shown,
-            given=_balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale)),
+            as_it_is=as_it_is,
+            given=_balanced(as_it_is, root_sigmas(lit)),
             result=empty_result(rows * cols, channels, half=half, residual=residual, spare=spare),
             predicted=planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare),
             half=half,
             residual=residual,
             threads=threads,
         )
+
+    def balanced(self, sigmas: Doubles) -> "Solution":
+        """Return the same with lights whose measurements are off by ``sigmas`` (light,), beside each other."""
+        return replace(self, given=_balanced(self.as_it_is, sigmas))
 
     def run(
         self,
@@ -97,14 +112,14 @@ class Solution:
         return surface_of(self.result, self.predicted if error else None, self.shown.shape, half=self.half)
 
 
-def _balanced(given: Task) -> Task:
-    """Return the task in units in which residuals of strong and of weak lights compare, which thresholds need.
+def _balanced(given: Task, sigmas: Doubles) -> Task:
+    """Return the task in units in which residuals of strong and of weak lights compare, which medians and thresholds
+    need: each light's measurements over what they are off by.
 
-    Photon noise grows with the root of a light's strength, highlights and shadows with the strength itself: dividing
-    by the root is right for the first, and between noise that is alike in all plates and the second. From four distant
-    lights on, up to FEW are filled up with lights that weigh nothing, for which there is a faster way.
+    From four distant lights on, up to FEW are filled up with lights that weigh nothing, for which there is a faster
+    way.
     """
-    factor = np.sqrt(given.per_strength)[: given.lights, None]
+    factor = (1 / sigmas[:, None]).astype(np.float32)
     tone = given.tone.copy()
     tone[: given.lights, :, :3] *= factor[..., None]
     tone[: given.lights, :, 3] /= factor
@@ -113,6 +128,8 @@ def _balanced(given: Task) -> Task:
     matrix, per_strength = given.matrix.copy(), given.per_strength.copy()
     matrix[: given.lights] *= factor
     per_strength[: given.lights] /= factor[:, 0]
+    noise = given.noise.copy()
+    noise[: given.lights] *= np.concatenate([factor**2, factor], axis=1)
     strengths = given.near.strengths.copy()  # empty where all lights are distant
     strengths[: given.lights] *= factor[: len(strengths), 0]
     near = given.near._replace(strengths=strengths)
@@ -122,5 +139,6 @@ def _balanced(given: Task) -> Task:
         matrix=np.pad(matrix, ((0, more), (0, 0))),
         per_strength=np.pad(per_strength, (0, more), mode="edge"),
         dark=np.pad(dark, (0, more), mode="edge"),
+        noise=np.pad(noise, ((0, more), (0, 0))),
         near=near,
     )

@@ -76,8 +76,6 @@ def weights(
         contradiction=np.float32(reweighting.contradiction),
         most_error_deg=np.float32(most_error_deg),
         common=np.float32(common),
-        read=np.float32(noise[0]),
-        photon=np.float32(noise[1]),
         curve=np.float32(curve),
         rough=np.float32(rough),
         broad=np.float32(shine[0] * unit),

@@ -16,6 +16,7 @@ from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import MEASURED, Misfit, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.light_sigmas import combined_noise, light_sigmas
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.surface_bits import bits, stored
 from psvideo.solve.normals.task import LIGHTS, Samples, Spread
@@ -23,7 +24,7 @@ from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.signs import Signs, signs_of
-from psvideo.solve.normals.trust.thin_surface import ThinSurface
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, brightness
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
 
 
@@ -142,6 +143,13 @@ def _thin_shape(surface: Surface, one: Evidence) -> tuple[int, int]:
     return -(-rows // step), -(-cols // step)
 
 
+def _typical_light(surface: Surface, one: Evidence) -> float:
+    """Return the albedo that is typical of the brighter half of a surface."""
+    step = one.step_of(surface.valid.shape)
+    shown = brightness(surface.albedo[::step, ::step])[surface.valid[::step, ::step]]
+    return float(np.median(shown[shown >= np.median(shown)])) if shown.size else 0.0
+
+
 def looked_at(
     surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()
 ) -> tuple[ThinSurface, Signs]:
@@ -176,7 +184,11 @@ class _Spread:
     def of(cls, surface: Surface, one: Evidence, noise: PlateNoise, how: Judging, near: NearSpread) -> "_Spread":
         lit = one.lit
         strength, lights = lit.intensities.mean(axis=1), len(lit.intensities)
+        light = _typical_light(surface, one) * float(strength.mean())
+        sigmas = light_sigmas(lit, combined_noise(noise, lit), light=light, share=how.least_share)
         matrix = lit.directions * strength[:, None]
+        to_noise = matrix / sigmas[:, None]  # robust solving weighs by noise, least squares counts all lights alike
+        solving = np.linalg.pinv(matrix) * sigmas if surface.error_deg is None else np.linalg.pinv(to_noise)
         channels, (_, photon_share), mean = len(lit.shares), lit.noise_shares, float(strength.mean())
         floors = [(share * mean) ** 2 for share in (how.least_share, float(LIGHTS))]
         photon = noise.photon * photon_share * float(np.sqrt(lit.shares.mean()))  # ``judge_rows`` divides by the shares
@@ -187,7 +199,7 @@ class _Spread:
             step=one.step_of(surface.valid.shape),
             noise=Spread(
                 shares=lit.shares.astype(np.float32),
-                inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
+                inverse=(solving @ solving.T).astype(np.float32),
                 variances=np.array(variances, np.float32),
                 scale=np.float32(np.degrees(how.held)),
                 toward=(matrix.mean(axis=0) / mean).astype(np.float32),
