@@ -48,6 +48,15 @@ def test_a_ply_reads_back_with_points_normals_and_srgb_colours(tmp_path: Path) -
     assert read.face_normals[0] @ [0, 0, 1] > 0.99  # wound towards the camera
 
 
+def test_an_instant_of_which_nothing_is_known_is_a_mesh_without_points(tmp_path: Path) -> None:
+    mesh, none = triangle(), slice(0, 0)
+    write_ply(tmp_path / "a.ply", Mesh(**{name: part[none] for name, part in vars(mesh).items()}), CAMERA_SPACE)
+    head, _, rest = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
+    assert b"element vertex 0\n" in head
+    assert b"element face 0\n" in head
+    assert rest == b""
+
+
 def test_srgb_codes_follow_the_standard() -> None:
     linear = np.array([[0.0, 0.0031308, 0.2158605], [0.5, 1.0, 7.0]], np.float32)
     assert srgb_codes(linear)[:, :3].tolist() == [[0, 10, 128], [188, 255, 255]]

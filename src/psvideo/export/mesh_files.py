@@ -48,19 +48,23 @@ def in_space(mesh: Mesh, space: Space) -> Mesh:
 
 
 def write_ply(path: Path, mesh: Mesh, space: Space) -> None:
-    """Write one mesh as a binary PLY with normals and vertex colours, whole or not at all."""
+    """Write one mesh as a binary PLY with normals and vertex colours, whole or not at all.
+
+    One without points is a file, too, so that the sequence has no hole.
+    """
     placed_mesh = in_space(mesh, space)
     import trimesh  # only where meshes are asked for: it takes 0.3 s and 40 MB
 
+    some = len(mesh.points) > 0  # trimesh 4 cannot export colours or normals of no point
     shape = trimesh.Trimesh(
         vertices=placed_mesh.points,
         faces=placed_mesh.triangles,
-        vertex_normals=placed_mesh.normals,
-        vertex_colors=srgb_codes(placed_mesh.colours),
+        vertex_normals=placed_mesh.normals if some else None,
+        vertex_colors=srgb_codes(placed_mesh.colours) if some else None,
         process=False,
     )
     with whole_file(path) as beside:
-        beside.write_bytes(trimesh.exchange.ply.export_ply(shape, encoding="binary", vertex_normal=True))
+        beside.write_bytes(trimesh.exchange.ply.export_ply(shape, encoding="binary", vertex_normal=some))
 
 
 def srgb_codes(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
