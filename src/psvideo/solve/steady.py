@@ -3,7 +3,8 @@
 Rounds are pooled in blocks of fixed numbers. A pixel's class is what most of the last rounds say, and what is not
 trusted shows their mean; what is trusted stays as it was measured. As a block goes on, its rounds take the place of the
 block before, one after the other, so that nothing jumps. Where the picture changed, a pixel begins again: nothing is
-smeared. So a result depends on its block and the one before, and on no other round.
+smeared. It does so in the next round once more, for plates are made of two flashes each, and that round's still of what
+was there before. So a result depends on its block and the one before, and on no other round.
 """
 
 from collections.abc import Iterator
@@ -24,7 +25,7 @@ from psvideo.solve.normals.surface_bits import bits, stored
 from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
 
 SHOWN = np.ones((1, 1), np.bool_)
-MOST_SINCE = 255
+MOST_SINCE, ONCE_MORE = 255, np.uint8(1)
 EACH_SLOT = 256
 IN_FILES_FROM = 1 << 22
 """This many votes or values and more lie in files: every pixel of a clip that noise lets nobody trust would be held."""
@@ -35,9 +36,9 @@ class Steady:
     """What is held between rounds of segments of rows where any pixel is not trusted, and in the block after.
 
     ``slots`` (row, segment) says where in ``pool`` a segment is, -1 where it is not; ``used`` of its slots are.
-    ``since`` counts rounds at rest on a coarse grid, ``trusted`` (row, col) is the last round's, and ``shown`` where
-    all lights showed the picture in it, on a grid. ``spare`` is a folder in whose files large pools lie, None where
-    they lie in memory.
+    ``since`` counts rounds at rest on a coarse grid, and the first one, before which nothing is known to have changed;
+    ``trusted`` (row, col) is the last round's, and ``shown`` where all lights showed the picture in it, on a grid.
+    ``spare`` is a folder in whose files large pools lie, None where they lie in memory.
     """
 
     number: int
@@ -86,14 +87,14 @@ def steadied(
     spare: a folder in whose files much of what is held lies; left out, in memory.
     """
     if held is None or stood is None or number != held.number + 1:
-        held, stood = Steady.beginning(surface, number, spare), np.zeros((1, 1), np.bool_)
+        held, stood = Steady.beginning(surface, number, spare), np.ones((1, 1), np.bool_)
     held.number = number
     held.since = _counted(_counted(held.since, stood), held.shown & shown, more=0)
     held.shown = shown
     place = number % POOLED_ROUNDS + 1
     if place == 1:
         _turn(held)
-    still = Still(held.since, place, POOLED_ROUNDS, held.trusted)
+    still = Still(np.maximum(held.since, 1) - ONCE_MORE, place, POOLED_ROUNDS, held.trusted)
     planes, albedo = stored(surface)
     error = np.zeros((0, 0), planes.dtype) if surface.error_deg is None else bits(surface.error_deg)
     if surface.source is None:
