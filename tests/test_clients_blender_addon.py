@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
+import tomlkit
 from numpy.typing import NDArray
 
 from psvideo.cli.app import main
@@ -36,12 +37,15 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("addon")
     assert main(["synth", str(ROOT / "data_synth" / "sphere.toml"), "-o", str(folder / "clip"), "-q"]) == 0
     (folder / "camera.txt").write_text("\n".join(" ".join(map(str, row)) for row in TURN), encoding="utf-8")
+    rig = tomlkit.parse((folder / "clip" / "rig.toml").read_text(encoding="utf-8"))
+    rig["camera"] = {"focal_px": [4000.0, 3000.0], "principal_px": [89.5, 49.5]}
+    (folder / "lens.toml").write_text(tomlkit.dumps(rig), encoding="utf-8")
     return folder / "clip"
 
 
-def delivered(clip: Path, name: str, *more: str) -> Path:
+def delivered(clip: Path, name: str, *more: str, rig: str = "clip/rig.toml") -> Path:
     out = clip.parent / name
-    options = ["--rig", str(clip / "rig.toml"), "-o", str(out), "--for", "blender", "--frames", "0-14", "-q", *more]
+    options = ["--rig", str(clip.parent / rig), "-o", str(out), "--for", "blender", "--frames", "0-14", "-q", *more]
     assert main(["normals", str(clip), *options]) == 0
     return out
 
@@ -108,9 +112,9 @@ def test_what_is_no_result_is_said(files: dict[str, str], said: str, tmp_path: P
 
 @pytest.fixture(scope="module")
 def seen(clip: Path, out: Path) -> dict[str, Any]:
-    """What Blender made of a card, of the same in world space, and of a mesh."""
-    world = delivered(clip, "world", "--camera-to-world", str(clip.parent / "camera.txt"))
-    mesh = delivered(clip, "mesh", "--mesh", "ply")
+    """What Blender made of a card, of the same in world space, and of a mesh, the last two through a lens that squeezes."""
+    world = delivered(clip, "world", "--camera-to-world", str(clip.parent / "camera.txt"), rig="lens.toml")
+    mesh = delivered(clip, "mesh", "--mesh", "ply", rig="lens.toml")
     first: int = json.loads((out / "delivery.json").read_text(encoding="utf-8"))["first"]
     wanted = [(out, "CARD", first + 1, "card"), (world, "CARD", first + 1, "world"), (mesh, "MESH", first, "mesh")]
     jobs = [
@@ -179,4 +183,5 @@ def test_the_scene_has_lights_camera_rate_and_range(clip: Path, out: Path, seen:
     assert card["suns"] == [f"clip {light.name}" for light in read_rig(clip / "rig.toml").lights]
     assert card["fps"] == pytest.approx(said["fps"][0] / said["fps"][1], rel=1e-6)
     assert card["frames"] == [said["first"], said["last"]]
+    assert [one["pixel_height"] for one in seen["seen"]] == pytest.approx([1, 4 / 3, 4 / 3], rel=1e-6)
     assert "no folder of psvideo results" in seen["refused"]

@@ -27,7 +27,7 @@ def delivered(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     assert main(["synth", str(SCENES / "sphere.toml"), "-o", str(clip), "-q"]) == 0
     (folder / "camera.txt").write_text("\n".join(" ".join(map(str, row)) for row in TURN), encoding="utf-8")
     rig = tomlkit.parse((clip / "rig.toml").read_text(encoding="utf-8"))
-    rig["camera"] = {"focal_px": [400.0, 400.0], "principal_px": [89.5, 49.5]}
+    rig["camera"] = {"focal_px": [400.0, 320.0], "principal_px": [89.5, 49.5]}
     rig["surface"] = {"plane": [0.0, 0.0, 1.0, 2.5]}
     (folder / "lens.toml").write_text(tomlkit.dumps(rig), encoding="utf-8")
     made: dict[str, Path] = {}
@@ -76,7 +76,8 @@ def test_the_card_fills_the_cameras_view_and_shows_the_picture_upright(
     seen = points @ np.array(frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix())
     places = np.array(geometry.PrimvarsAPI(card).GetPrimvar("st").Get())
     assert seen[:, :2] / seen[:, 3:] == pytest.approx(2 * places - 1, abs=1e-5)
-    assert camera.horizontalAperture / camera.verticalAperture == pytest.approx(160 / 120)
+    pixel_height = 400 / 320 if name == "world" else 1.0
+    assert camera.horizontalAperture / camera.verticalAperture == pytest.approx(160 / 120 / pixel_height)
     if name == "world":
         assert np.array(place)[3, :3] == pytest.approx(TURN[:3, 3])
         assert camera.focalLength / camera.horizontalAperture == pytest.approx(400 / 160)
@@ -119,7 +120,7 @@ def test_a_mesh_takes_the_cards_place_with_the_pictures_places(delivered: Callab
     points = np.array(mesh.GetPointsAttr().Get(number))
     places = np.array(geometry.PrimvarsAPI(mesh).GetPrimvar("st").Get(number))
     across = (points[:, 0] / -points[:, 2] * 400 + 89.5 + 0.5) / 160
-    upward = 1 - (-points[:, 1] / -points[:, 2] * 400 + 49.5 + 0.5) / 120
+    upward = 1 - (-points[:, 1] / -points[:, 2] * 320 + 49.5 + 0.5) / 120
     assert np.stack([across, upward], axis=-1) == pytest.approx(places, abs=1e-4)
     material, _ = shade.MaterialBindingAPI(mesh).ComputeBoundMaterial()
     assert str(material.GetPath()) == "/delivery/surface"

@@ -39,6 +39,7 @@ def brought_in(job: dict[str, Any]) -> dict[str, Any]:
         "fps": rate,
         "frames": [here.frame_start, here.frame_end],
         "lens": here.camera.data.type,
+        "pixel_height": here.render.pixel_aspect_y / here.render.pixel_aspect_x,
     }
 
 

@@ -22,7 +22,8 @@ def build(context, found: Results, *, shape: str, lights: bool, camera: bool, ti
     made = bpy.data.collections.new(f"psvideo {found.clip}")
     context.scene.collection.children.link(made)
     place = _camera_place(found)
-    surface = _mesh(context, found, made, height / width) if shape == "MESH" else _card(found, made, height / width)
+    high = found.pixel_height * height / width
+    surface = _mesh(context, found, made, high) if shape == "MESH" else _card(found, made, high)
     if shape == "CARD":
         surface.matrix_world = place @ Matrix.Translation((0, 0, -DISTANCE))
     elif found.space != "world":
@@ -31,13 +32,19 @@ def build(context, found: Results, *, shape: str, lights: bool, camera: bool, ti
     surface.data.materials.append(_material(found))
     if camera:
         context.scene.camera = _camera(found, made, place)
-        context.scene.render.resolution_x, context.scene.render.resolution_y = width, height
+        _set_picture(context.scene.render, found, (width, height))
     if lights:
         for light in found.lights:
             _sun(light, found, made, place)
     if timing:
         _set_timing(context.scene, found)
     return made
+
+
+def _set_picture(render, found: Results, size: tuple[int, int]) -> None:
+    """Render as the shot's camera took its picture: Blender's pixels are at least as wide, and as high, as 1."""
+    render.resolution_x, render.resolution_y = size
+    render.pixel_aspect_x, render.pixel_aspect_y = max(1 / found.pixel_height, 1.0), max(found.pixel_height, 1.0)
 
 
 def _size(found: Results) -> tuple[int, int]:

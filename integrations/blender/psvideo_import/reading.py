@@ -16,7 +16,8 @@ class NotResultsError(Exception):
 @dataclass(frozen=True)
 class Results:
     """A folder of results. ``first`` and ``count`` are of its normals' numbers; ``lights`` have a direction and a
-    colour in the frame of the normals; ``focal`` and ``middle`` are in widths of the picture, None where unknown."""
+    colour in the frame of the normals; ``focal`` and ``middle`` are in widths of the picture, None where unknown, and
+    ``pixel_height`` in widths of a pixel."""
 
     folder: Path
     clip: str
@@ -28,6 +29,7 @@ class Results:
     lights: list = field(default_factory=lambda: [ANY_LIGHT])
     focal: float | None = None
     middle: tuple[float, float] = (0.0, 0.0)
+    pixel_height: float = 1.0
     camera_to_world: list | None = None
 
     def file(self, quantity: str) -> Path:
@@ -64,7 +66,8 @@ def _said(path: Path) -> dict:
         if camera is not None:
             right, down = camera["principal_px"] or [(width - 1) / 2, (height - 1) / 2]
             known["focal"] = camera["focal_px"][0] / width
-            known["middle"] = ((right + 0.5) / width - 0.5, (height / 2 - down - 0.5) / width)
+            known["pixel_height"] = tall = camera["focal_px"][0] / camera["focal_px"][1]
+            known["middle"] = ((right + 0.5) / width - 0.5, (height / 2 - down - 0.5) / width * tall)
         return known
-    except (KeyError, TypeError, ValueError) as fault:
+    except (ArithmeticError, KeyError, TypeError, ValueError) as fault:
         raise NotResultsError(f"{path}: cannot be read ({fault!r}); write the results again") from fault

@@ -35,7 +35,8 @@ class StageView:
     """The camera of a stage, and the lights as it sees them.
 
     ``focal`` and ``middle`` (right, up) are in widths of the picture, ``middle`` being where the optical axis meets it
-    from its centre; ``focal`` None is an orthographic view. ``away_m`` is how far the subject is. ``poses`` are
+    from its centre; ``focal`` None is an orthographic view. ``pixel_height`` is in widths of a pixel: other than 1 of
+    anamorphic lenses, and a little of calibrated ones. ``away_m`` is how far the subject is. ``poses`` are
     camera-to-world matrices (4, 4) by number, one where it stands still, none in camera space. ``near`` are lights with
     a position, ``lights`` the others; both in the camera's frame.
     """
@@ -46,6 +47,7 @@ class StageView:
     poses: Mapping[int, Doubles]
     lights: Sequence[SeenLight]
     near: Sequence[Light] = ()
+    pixel_height: float = 1.0
 
 
 def stage_name(clip: str) -> str:
@@ -110,17 +112,22 @@ def _camera(made: Delivered, view: StageView) -> list[str]:
         f'token projection = "{"orthographic" if view.focal is None else "perspective"}"',
         lens,
         f"float horizontalAperture = {wide:.9g}",
-        f"float verticalAperture = {wide * made.height_px / made.width_px:.9g}",
+        f"float verticalAperture = {wide * _shape(made, view):.9g}",
         f"float horizontalApertureOffset = {-view.middle[0] * wide:.9g}",
         f"float verticalApertureOffset = {-view.middle[1] * wide:.9g}",
         f"float2 clippingRange = {numbers_of((0.01 / unit, 1000 / unit))}",
     )
 
 
+def _shape(made: Delivered, view: StageView) -> float:
+    """Return the picture's height in its widths."""
+    return view.pixel_height * made.height_px / made.width_px
+
+
 def _card(made: Delivered, view: StageView) -> list[str]:
     away = view.away_m or CARD_M
     wide = (1.0 if view.focal is None else away / view.focal) / made.delivery.space.unit_m
-    high, deep = wide * made.height_px / made.width_px, -away / made.delivery.space.unit_m
+    high, deep = wide * _shape(made, view), -away / made.delivery.space.unit_m
     right, up = (-part * wide for part in view.middle)
     across = (right - wide / 2, right + wide / 2)
     upward = (up - high / 2, up + high / 2)

@@ -128,13 +128,13 @@ def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float
     """Return the camera and the lights of a stage, in the camera's frame."""
     lights = lights_as_planned(rig, clip.plan)
     near = tuple(light for light in lights if light.position_m is not None)
-    focal, middle = None, (0.0, 0.0)
+    focal, middle, pixel_height = None, (0.0, 0.0), 1.0
     if rig.focal_px is not None:
         col, row = rig.principal_px or ((clip.width_px - 1) / 2, (clip.height_px - 1) / 2)
-        focal = rig.focal_px[0] / clip.width_px
+        focal, pixel_height = rig.focal_px[0] / clip.width_px, rig.focal_px[0] / rig.focal_px[1]
         middle = (
             (col + 0.5) / clip.width_px - 0.5,
-            (0.5 * clip.height_px - row - 0.5) / clip.width_px,
+            (0.5 * clip.height_px - row - 0.5) / clip.width_px * pixel_height,
         )
     moving = space.moving is not None
     posed = [number for number in instants if space.name == "world" and (moving or number == min(instants))]
@@ -142,6 +142,7 @@ def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float
     return StageView(
         focal=focal,
         middle=middle,
+        pixel_height=pixel_height,
         away_m=rig.plane[3] / rig.plane[2] if rig.plane and rig.plane[2] else None,
         poses={number: space.at(instants[number], number, fps).matrix for number in posed},
         lights=() if near else lights_seen(rig, clip, CAMERA_SPACE),
