@@ -112,7 +112,7 @@ def test_what_is_no_result_is_said(files: dict[str, str], said: str, tmp_path: P
 
 @pytest.fixture(scope="module")
 def seen(clip: Path, out: Path) -> dict[str, Any]:
-    """What Blender made of a card, of the same in world space, and of a mesh, the last two through a lens that squeezes."""
+    """What Blender made of a card, and through a lens that squeezes of the same in world space, and of a mesh."""
     world = delivered(clip, "world", "--camera-to-world", str(clip.parent / "camera.txt"), rig="lens.toml")
     mesh = delivered(clip, "mesh", "--mesh", "ply", rig="lens.toml")
     first: int = json.loads((out / "delivery.json").read_text(encoding="utf-8"))["first"]

@@ -30,6 +30,9 @@ def delivered(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     rig["camera"] = {"focal_px": [400.0, 320.0], "principal_px": [89.5, 49.5]}
     rig["surface"] = {"plane": [0.0, 0.0, 1.0, 2.5]}
     (folder / "lens.toml").write_text(tomlkit.dumps(rig), encoding="utf-8")
+    del rig["light"][0]["direction"]
+    rig["light"][0] |= {"position_m": [0.5, 0.25, -0.5], "anisotropy": 1.5}
+    (folder / "near.toml").write_text(tomlkit.dumps(rig), encoding="utf-8")
     made: dict[str, Path] = {}
 
     def run(name: str, rig: str, *more: str) -> Path:
@@ -48,6 +51,7 @@ CASES = {
     "world": ("lens.toml", "--for", "blender", "--camera-to-world", "camera.txt"),
     "mesh": ("lens.toml", "--mesh", "usd", "--frames", "0-9"),
 }
+NEAR = ("near.toml", "--for", "blender", "--frames", "0-9")
 
 
 def stage_of(delivered: Callable[..., Path], name: str) -> Any:
@@ -93,6 +97,23 @@ def test_lights_shine_from_where_the_rig_says_and_as_strong(delivered: Callable[
         strength = prim.GetAttribute("inputs:intensity").Get() * np.array(prim.GetAttribute("inputs:color").Get())
         assert strength / np.pi == pytest.approx(np.broadcast_to(light.intensity, 3), rel=1e-6)
         assert prim.GetAttribute("inputs:normalize").Get()
+
+
+def test_a_near_lamp_stands_in_its_place_beams_as_the_rig_says_and_leaves_the_distant_ones(
+    delivered: Callable[..., Path],
+) -> None:
+    stage = usd.Stage.Open(str(delivered("near", *NEAR)))
+    lights = stage.GetPrimAtPath("/delivery/shot/lights").GetChildren()
+    assert [one.GetTypeName() for one in lights] == ["DistantLight", "DistantLight", "SphereLight"]
+    turn = np.array(geometry.Xformable(lights[-1]).ComputeLocalToWorldTransform(usd.TimeCode.Default()))
+    place = np.array([0.5, 0.25, -0.5])
+    assert turn[3, :3] == pytest.approx(place)
+    middle = np.array([(80 - 89.5) / 400 * 2.5, -(60 - 49.5) / 320 * 2.5, -2.5])  # of the surface: lamps point there
+    assert np.array([0, 0, -1]) @ turn[:3, :3] == pytest.approx(
+        (middle - place) / np.linalg.norm(middle - place), abs=1e-6
+    )
+    assert lights[-1].GetAttribute("inputs:shaping:focus").Get() == 1.5
+    assert lights[-1].HasAPI("ShapingAPI")
 
 
 @pytest.mark.parametrize("name", CASES)

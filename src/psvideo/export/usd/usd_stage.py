@@ -38,7 +38,7 @@ class StageView:
     from its centre; ``focal`` None is an orthographic view. ``pixel_height`` is in widths of a pixel: other than 1 of
     anamorphic lenses, and a little of calibrated ones. ``away_m`` is how far the subject is. ``poses`` are
     camera-to-world matrices (4, 4) by number, one where it stands still, none in camera space. ``near`` are lights with
-    a position, ``lights`` the others; both in the camera's frame.
+    a position, each with its axis where that is known, ``lights`` the others; both in the camera's frame.
     """
 
     focal: float | None
@@ -159,33 +159,45 @@ def _mesh(made: Delivered) -> list[str]:
 
 def _sun(light: SeenLight, name: str) -> list[str]:
     """A distant light: it shines along its own -z; normalized, so that its strength is the light that arrives."""
-    z = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
-    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.99 else [1.0, 0.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    turn = np.eye(4)
-    turn[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     return prim(
         f'def DistantLight "{name}"',
         "float inputs:angle = 0",
         "bool inputs:normalize = 1",
         _shine(light.colour, WHITE),
-        f"matrix4d xformOp:transform = {matrix_of(turn)}",
+        f"matrix4d xformOp:transform = {matrix_of(_shining(from_=light.direction))}",
         'uniform token[] xformOpOrder = ["xformOp:transform"]',
     )
 
 
 def _lamp(light: Light, name: str, unit_m: float) -> list[str]:
-    """A near light: a point whose irradiance at one metre is the rig's; a normalized sphere gives strength / (4 d²)."""
-    at = np.array(light.position_m, np.float64) / unit_m
+    """A near light: a point whose irradiance at one metre is the rig's; a normalized sphere gives strength / (4 d²).
+
+    ``focus`` is the power of the cosine from its axis (OpenUSD's guide to ShapingAPI), the rig's anisotropy.
+    """
+    place, shaped = np.eye(4), bool(light.anisotropy) and light.axis is not None
+    if light.axis is not None:
+        place = _shining(from_=-np.asarray(light.axis, np.float64))
+    place[:3, 3] = np.array(light.position_m, np.float64) / unit_m
     return prim(
-        f'def SphereLight "{name}"',
+        f'def SphereLight "{name}"' + (' (\n        prepend apiSchemas = ["ShapingAPI"]\n    )' if shaped else ""),
         f"float inputs:radius = {0.01 / unit_m:.9g}",
         "bool inputs:normalize = 1",
         "bool treatAsPoint = 1",
+        [f"float inputs:shaping:focus = {light.anisotropy:.9g}"] if shaped else [],
         _shine(light.intensity if len(light.intensity) == 3 else light.intensity[:1] * 3, 4 * WHITE / unit_m**2),
-        f"double3 xformOp:translate = {numbers_of(at)}",
-        'uniform token[] xformOpOrder = ["xformOp:translate"]',
+        f"matrix4d xformOp:transform = {matrix_of(place)}",
+        'uniform token[] xformOpOrder = ["xformOp:transform"]',
     )
+
+
+def _shining(*, from_: Sequence[float] | Doubles) -> Doubles:
+    """Return how a light turns (4, 4) that shines along its own -z, to shine from a direction."""
+    z = np.asarray(from_, np.float64) / np.linalg.norm(from_)
+    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.99 else [1.0, 0.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    turn = np.eye(4)
+    turn[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    return turn
 
 
 def _shine(colour: Sequence[float], factor: float) -> list[str]:

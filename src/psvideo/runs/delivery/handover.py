@@ -4,7 +4,7 @@ import os
 import shutil
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from urllib.parse import quote
@@ -27,8 +27,8 @@ from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.choices import CODECS, MovieCodec, Preview
 from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.irradiance.intensity import lights_as_planned
-from psvideo.model.irradiance.near_light import is_near
-from psvideo.model.rig import Rig
+from psvideo.model.irradiance.near_light import is_near, near_field
+from psvideo.model.rig import Light, Rig
 from psvideo.runs.delivery.previews import PreviewedInstant, preview_name, write_preview
 from psvideo.runs.delivery.relit import KEPT, relit_file
 from psvideo.runs.steps.caller import Caller
@@ -127,7 +127,6 @@ def write_stage(run: Finished, delivery: Delivery, rig: Rig, instants: Mapping[i
 def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float]) -> StageView:
     """Return the camera and the lights of a stage, in the camera's frame."""
     lights = lights_as_planned(rig, clip.plan)
-    near = tuple(light for light in lights if light.position_m is not None)
     focal, middle, pixel_height = None, (0.0, 0.0), 1.0
     if rig.focal_px is not None:
         col, row = rig.principal_px or ((clip.width_px - 1) / 2, (clip.height_px - 1) / 2)
@@ -136,6 +135,7 @@ def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float
             (col + 0.5) / clip.width_px - 0.5,
             (0.5 * clip.height_px - row - 0.5) / clip.width_px * pixel_height,
         )
+    near = {light.name: light for light in _with_axes(lights, rig, clip)}
     moving = space.moving is not None
     posed = [number for number in instants if space.name == "world" and (moving or number == min(instants))]
     fps = clip.filmed_plan.camera.fps
@@ -145,9 +145,19 @@ def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float
         pixel_height=pixel_height,
         away_m=rig.plane[3] / rig.plane[2] if rig.plane and rig.plane[2] else None,
         poses={number: space.at(instants[number], number, fps).matrix for number in posed},
-        lights=() if near else lights_seen(rig, clip, CAMERA_SPACE),
-        near=near,
+        lights=[one for one in lights_seen(rig, clip, CAMERA_SPACE) if one.name not in near],
+        near=[*near.values()],
     )
+
+
+def _with_axes(lights: Sequence[Light], rig: Rig, clip: Clip) -> tuple[Light, ...]:
+    """Return the near ones among lights; they shine at the surface's middle where the rig gives no axis."""
+    near = tuple(light for light in lights if light.position_m is not None)
+    if not near or rig.plane is None:
+        return near
+    ground = ground_of(rig, height_px=clip.height_px, width_px=clip.width_px)
+    axes = near_field(near, ground).axes.tolist()
+    return tuple(replace(light, axis=tuple(axis)) for light, axis in zip(near, axes, strict=True))
 
 
 def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[SeenLight, ...]:
