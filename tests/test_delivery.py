@@ -411,6 +411,24 @@ def test_depth_alone_is_no_position_in_a_programs_note(program: Program) -> None
     assert "relative positions" not in said
 
 
+def test_nuke_s_note_promises_the_lights_that_its_script_holds() -> None:
+    made = Delivered(
+        clip="take7",
+        numbers=(1, 2),
+        fps=Fraction(24),
+        width_px=64,
+        height_px=48,
+        metric=False,
+        delivery=delivery_of(replace(NOTHING, preset="nuke"))[0],
+        lights=(SeenLight(name="rim", direction=(0.0, 0.6, 0.8)),),
+    )
+    without = replace(made, lights=())
+    assert "rim" in nuke_script(made)
+    assert "a relighting group for every light of the shoot" in loading_note("nuke", made)
+    assert "rim" not in nuke_script(without)
+    assert "for one light of its own" in loading_note("nuke", without)
+
+
 @pytest.mark.parametrize("name", ["take [3]", '5$ "a"', "back\\slash", "plain_01"])
 def test_tcl_leaves_a_clip_s_name_in_nuke_s_script_as_nuke_is_to_read_it(name: str) -> None:
     tcl = pytest.importorskip("tkinter").Tcl()

@@ -81,6 +81,7 @@ def test_the_card_fills_the_cameras_view_and_shows_the_picture_upright(
     places = np.array(geometry.PrimvarsAPI(card).GetPrimvar("st").Get())
     assert seen[:, :2] / seen[:, 3:] == pytest.approx(2 * places - 1, abs=1e-5)
     pixel_height = 400 / 320 if name == "world" else 1.0
+    assert camera.clippingRange.min == pytest.approx(0.01 if name == "world" else -1000)
     assert camera.horizontalAperture / camera.verticalAperture == pytest.approx(160 / 120 / pixel_height)
     if name == "world":
         assert np.array(place)[3, :3] == pytest.approx(TURN[:3, 3])

@@ -87,10 +87,15 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
         "ReLight needs point positions in metres, which this rig does not give (lens and plane): use the script's "
         "groups."
     )
+    groups = (
+        "a relighting group for every light of the shoot"
+        if made.lights
+        else "a relighting group for one light of its own, since those of the shoot have no one direction here"
+    )
     return (
         [
-            f"Open {made.clip}.nk, which lies beside this note: the sequences read as they must be, a relighting group "
-            "for every light of the shoot (drag its direction and colour), and their sum. Or by hand:",
+            f"Open {made.clip}.nk, which lies beside this note: the sequences read as they must be, {groups} (drag its "
+            "direction and colour), and their sum. Or by hand:",
             f"Read: {files}, range {made.first}-{made.last}; tick Raw Data. Set the project to "
             f"{float(made.fps):.6g} fps.",
             f"The parts of the file are layers of these names: {', '.join(made.delivery.bundle)}. x, y, z are in red, "

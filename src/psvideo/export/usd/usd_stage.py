@@ -106,6 +106,9 @@ def _camera(made: Delivered, view: StageView) -> list[str]:
     unit = made.delivery.space.unit_m
     # without a lens the picture is as wide as one unit of its relative depth, in metres as far as anybody knows
     wide = TENTHS * (APERTURE_M if view.focal is not None else 1.0) / unit
+    nearest = (
+        0.01 if view.focal is not None else -1000
+    )  # relative depth stands before an orthographic camera and behind
     lens = [f"float focalLength = {view.focal * wide:.9g}"] if view.focal is not None else []
     return prim(
         'def Camera "camera"',
@@ -115,7 +118,7 @@ def _camera(made: Delivered, view: StageView) -> list[str]:
         f"float verticalAperture = {wide * _shape(made, view):.9g}",
         f"float horizontalApertureOffset = {-view.middle[0] * wide:.9g}",
         f"float verticalApertureOffset = {-view.middle[1] * wide:.9g}",
-        f"float2 clippingRange = {numbers_of((0.01 / unit, 1000 / unit))}",
+        f"float2 clippingRange = {numbers_of((nearest / unit, 1000 / unit))}",
     )
 
 
