@@ -8,6 +8,7 @@
  */
 #include "player.h"
 
+#include <avr/cpufunc.h>
 #include <avr/interrupt.h>
 #include <util/atomic.h>
 
@@ -187,6 +188,7 @@ bool player_is_beyond(uint32_t step) {
 void player_trim(share_t share, uint32_t from) {
     wanted_share = share;
     wanted_from = from;
+    _MemoryBarrier(); /* an interrupt that sees `wanted` finds the rest in its place */
     wanted = true;
 }
 
