@@ -22,6 +22,7 @@ from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_coun
 from psvideo.live.chain import Chain
 from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource
+from psvideo.live.keeping_up import KeepingUp
 from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.result_times import ResultTimes
 from psvideo.live.running import Running
@@ -214,6 +215,24 @@ def test_a_network_stream_that_is_silent_is_said_to_be_and_ctrl_c_ends_it_at_onc
         process.wait(timeout=30)
     assert time.monotonic() - began_s < ENDS_S
     assert "address and port" in said
+
+
+def test_a_slow_source_is_said_once_it_was_slow_for_some_seconds_also_while_the_strobe_is_looked_for(
+    make_plan: PlanMaker,
+) -> None:
+    """A stream that ends or begins within a second gives few frames in it; bare bytes may be of another size."""
+    plan, quality = make_plan(), first_quality(64, 48, mosaic=False)
+    states: list[LiveState] = ["seeking", "locked"]
+    for state in states:
+        keeping = KeepingUp(plan=plan, source="pipe", quality=quality, slow_hint="Or not.")
+        fps = [40.0, 120.0, 120.0, 40.0, 0.0, 0.0, 120.0]
+        paused = [standing(at_s=float(n), state=state, fps=one, frames=99) for n, one in enumerate(fps)]
+        assert [note for one in paused for note in keeping.notes_on(one, None)] == []
+        slow = [standing(at_s=float(n), state=state, fps=30.0, frames=99) for n in range(10)]
+        words = [note for one in slow for note in keeping.notes_on(one, None)]
+        assert len(words) == 1
+        assert words[0].startswith("pipe: its frames come at 30.0 a second, and the plan says 119.88")
+        assert words[0].endswith("Or not.")
 
 
 def test_one_late_result_of_a_second_is_late_though_most_are_not(make_plan: PlanMaker) -> None:

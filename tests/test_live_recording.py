@@ -65,6 +65,7 @@ def test_a_disk_that_fills_leaves_what_was_recorded_whole(
     said = " ".join(capsys.readouterr().err.split())
     assert "Recording ended after 60 frames, which are whole" in said
     assert "No space left on device" in said
+    assert "RECORDING ENDED, 60 recorded" in said
     assert len(ps.open_take(tmp_path / "rec").numbers) == 60
     assert main(words) == 2, "what is there is not replaced"
     assert "exists already" in capsys.readouterr().err
@@ -93,7 +94,7 @@ def test_a_writer_that_fails_in_any_way_ends_the_recording_and_nobody_waits_for_
     frame = LiveFrame(index=0, coded=Coded(codes=np.zeros((8, 8), np.uint8)), came_s=0.0)
     record.take(frame)
     record.write()
-    assert "Recording ended after 0 frames, which are whole: the next could not be written" in record.ended
+    assert "Recording ended at once: not even the first frame could be written" in record.ended
     record.take(frame)  # would wait for ever
 
 

@@ -157,6 +157,29 @@ def test_stamps_say_where_frames_are_and_a_restart_is_seen() -> None:
     assert places.restarts == 2
 
 
+def test_a_pause_counts_though_the_last_frame_before_it_is_handed_out_after_it() -> None:
+    """A decoder that waits for the next frame hands one out when it comes: two seconds late."""
+    places = StreamPlaces(rate_hz=100)
+    stamps = [*(n / 100 for n in range(10)), 0.10, 0.0, 0.01]
+    came = [*(n / 100 for n in range(10)), 2.10, 2.11, 2.12]
+    found = [places.place(stamp, at) for stamp, at in zip(stamps, came, strict=True)]
+    assert found == [*range(11), 211, 212]
+
+
+def test_a_pipe_whose_codes_are_not_the_plans_and_that_is_cut_off_says_so_in_plain_words(
+    clip: Path, pictures: Pictures, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The plan says that 65535 is white, and bytes come; then the sender begins again, with another head."""
+    small = [(one >> 8).astype(np.uint8) for one in grey(pictures)[:40]]
+    head = b"YUV4MPEG2 W96 H72 F100:1 Ip A1:1 Cmono\n"
+    piped(monkeypatch, head + b"".join(b"FRAME\n" + one.tobytes() for one in small) + head)
+    main(["live", "-", "--plan", str(clip / "plan.toml"), "--no-page"])
+    said = " ".join(capsys.readouterr().err.split())
+    assert "white_level is 65535 in the plan, and the largest code of these 8-bit files is 255" in said
+    assert "broke off (Invalid data found when processing input)" in said
+    assert "Errno" not in said
+
+
 def test_a_stream_over_the_network_arrives_frame_by_frame(clip: Path, pictures: Pictures) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))

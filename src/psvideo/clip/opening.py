@@ -8,7 +8,7 @@ from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.movies.yuv import signal_range
 from psvideo.clip.filters import check_filters
 from psvideo.clip.folder import MOVIES, RAWS, NumberedImages, find_sequence, unread
-from psvideo.clip.linear import depth_held
+from psvideo.clip.linear import depth_held, level_warning
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.stated import stated_by
 from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve, is_another_curve
@@ -68,7 +68,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         colour=header.colour or find_curve(encoding.transfer).colour,
         encoding=encoding,
         curve_doubt=_curve_doubt(sequence.kind, plan, header),
-        warnings=header.warnings + _curve_warnings(sequence.kind, plan, header) + _level_warning(header, encoding),
+        warnings=header.warnings + _curve_warnings(sequence.kind, plan, header) + level_warning(header, encoding),
         notes=((passed_over,) if sequence.passed_over else ()) + _depth_note(header, encoding) + _turn_note(header),
     )
 
@@ -110,7 +110,7 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         curve_doubt=_curve_doubt("movie", plan, movie.header),
         warnings=movie.header.warnings
         + _curve_warnings("movie", plan, movie.header)
-        + _level_warning(movie.header, encoding)
+        + level_warning(movie.header, encoding)
         + rate_warnings,
         places_per_frame=per_frame,
         notes=notes + _turn_note(movie.header),
@@ -153,16 +153,6 @@ def _depth_note(header: Header, encoding: Encoding) -> tuple[str, ...]:
     return (
         f"by the plan's white_level the files hold {held} bits in {header.bits}; the curve is taken off codes of "
         f"0 to {2**held - 1}",
-    )
-
-
-def _level_warning(header: Header, encoding: Encoding) -> tuple[str, ...]:
-    """Say where the plan's white level is one of other files: all light would count as so much darker."""
-    if header.bits is None or encoding.white_level is None or encoding.white_level < 2**header.bits:
-        return ()
-    return (
-        f"white_level is {encoding.white_level:g} in the plan, and the largest code of these {header.bits}-bit files "
-        f"is {2**header.bits - 1}: it is one of other files. Write the code at which these saturate, or leave it out",
     )
 
 

@@ -80,7 +80,9 @@ class Running:
 
     def __post_init__(self) -> None:
         """See who is waited for, and what has to keep up with what."""
-        self._keeping_up = KeepingUp(plan=self.chain.plan, source=self.source.name, quality=self.quality)
+        self._keeping_up = KeepingUp(
+            plan=self.chain.plan, source=self.source.name, quality=self.quality, slow_hint=self.source.slow_hint
+        )
         self._waiting = Waiting(name=self.source.name, check=self.source.check)
 
     def stop(self) -> None:
@@ -97,10 +99,17 @@ class Running:
                     self._beside(began_s)
             else:
                 self._one_by_one(began_s)
+        self._say_what_is_new(time.monotonic() - began_s)
         fault = self._fault or self.chain.fault
         if fault is not None:
             raise fault
         return self._standing.summary(began_s, first_lock_s=self.first_lock_s, paced=self.source.paced)
+
+    def _say_what_is_new(self, took_s: float) -> None:
+        """Say what came up since the last status, also where the run ends in a fault."""
+        said = () if self.status is None else self.status.notes
+        if self.all_notes != said:
+            self.said(self._status(took_s, took_s, Counted()))
 
     def _one_by_one(self, began_s: float) -> None:
         """Take and solve in turn: for a clip that is played as fast as it goes, so that nothing depends on time."""

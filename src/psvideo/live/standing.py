@@ -74,6 +74,7 @@ class Standing:
             compiling=compiling,
             waits_for=waits_for,
             recorded=None if self.recording is None else self.recording.written,
+            record_ended=self.recording is not None and bool(self.recording.ended),
             off_rows=None if holding is None else holding.short_rows,
             trim_ppm=None if holding is None or holding.ended else holding.ppm,
             notes=self.all_notes,

@@ -24,6 +24,7 @@ class LiveStatus:
 
     ``phase_error_rows``, ``clock_offset_ppm`` and ``order``, how the lights' names are known, are None while nothing is
     followed; ``why`` says then why not.
+    ``recorded`` counts the frames that are, None where none is to be; ``record_ended``: it ended before the run did.
     ``compiling`` says how far that is, "" where nothing is compiled. ``waits_for`` says what is missing and what to do
     where nothing can be shown for long.
     ``width_px`` and ``height_px`` are the live picture's; ``off_rows`` is how far the dark row
@@ -48,6 +49,7 @@ class LiveStatus:
     compiling: str = ""
     waits_for: str = ""
     recorded: int | None = None
+    record_ended: bool = False
     off_rows: float | None = None
     trim_ppm: int | None = None
     notes: tuple[str, ...] = ()
@@ -75,7 +77,7 @@ class LiveStatus:
             off = "dark row not held" if self.off_rows is None else f"dark row {-self.off_rows:+.1f} rows off"
             parts.append(f"{off}, trim {self.trim_ppm:+d} ppm")
         if self.recorded is not None:
-            parts.append(f"{self.recorded} recorded")
+            parts.append(f"{'RECORDING ENDED, ' if self.record_ended else ''}{self.recorded} recorded")
         return " | ".join(parts)
 
     @property
@@ -109,7 +111,7 @@ class LiveSummary:
         text = f"{self.frames} frames in {self.seconds:.1f} s, {self.lost} lost; {self.results} results."
         if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
             after = "" if self.first_lock_s is None else f" after {self.first_lock_s:.1f} s of footage"
-            again = "" if self.locks == 1 else f", and found again {self.locks - 1} times"
+            again = "" if self.locks == 1 else f", and found again {_times(self.locks - 1)}"
             text += (
                 f" The strobe was found{after}{again}; it runs "
                 f"{self.clock_offset_ppm:+.1f} ppm against the camera, its flashes known to "
@@ -125,3 +127,7 @@ class LiveSummary:
     def record(self) -> dict[str, object]:
         """The same for machines."""
         return {"done": True, **asdict(self)}
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

@@ -121,6 +121,7 @@ def told(status: LiveStatus | None, watching: Watching) -> dict[str, object]:
     return {
         "state": "preparing" if status is None else status.state,
         "line": "" if status is None else status.line,
+        "alarm": "Recording ended" if status is not None and status.record_ended else "",
         "compiling": "" if status is None else status.compiling,
         "notes": [] if status is None else [watching.spell(words) for words in status.all_words],
         "verdict": verdict_of(watching.lines) if watching.lines else "",

@@ -15,7 +15,7 @@ import av
 
 from psvideo.clip.decode.movies.movie_codes import rgb_codes
 from psvideo.clip.filters import check_live_filters
-from psvideo.clip.linear import in_codes
+from psvideo.clip.linear import in_codes, level_warning
 from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture, Frame
 from psvideo.clip.streams.stream_rate import StreamRate
@@ -28,6 +28,8 @@ OPEN_S = 20.0
 """A stream that has not begun after this long is taken for missing."""
 LEAP_S = 5.0
 """Stamps that leap by more are another stream's."""
+CLOCKS_DIFFER = 1e-3
+"""A sender's clock and this machine's differ by less, as shares of the time."""
 MOST_DAMAGED = 24
 """A stream of which more frames in a row cannot be decoded is no stream of pictures."""
 FEW_PX = 16
@@ -65,7 +67,11 @@ def stream_kind(raw: str | None) -> CodedPicture:
 
 @dataclass(kw_only=True)
 class StreamPlaces:
-    """Turns time stamps in seconds into places in time; ``restarts`` counts streams that began again."""
+    """Turns time stamps in seconds into places in time; ``restarts`` counts streams that began again.
+
+    A stream that begins again is placed by when its frame came, against when the quickest of those before came for
+    their places: the last one before a pause is often handed out only after it.
+    """
 
     rate_hz: float
     restarts: int = 0
@@ -73,18 +79,21 @@ class StreamPlaces:
     _stamp_s: float | None = None
     _place: int = -1
     _came_s: float = 0.0
+    _zero_came_s: float = float("inf")
 
     def place(self, stamp_s: float | None, came_s: float) -> int:
         """Return a frame's place, later than that of the one before, from its stamp and when it came."""
         if stamp_s is None:
             self._place += 1
         elif self._stamp_s is None or not -1e-9 < stamp_s - self._stamp_s < LEAP_S:
-            missed = 0 if self._stamp_s is None else max(round((came_s - self._came_s) * self.rate_hz) - 1, 0)
+            by_clock = 0 if self._stamp_s is None else round((came_s - self._zero_came_s) * self.rate_hz)
             self.restarts += self._stamp_s is not None
-            self._place += 1 + missed
+            self._place = max(by_clock, self._place + 1)
             self._zero_s = stamp_s - self._place / self.rate_hz
         else:
             self._place = max(round((stamp_s - self._zero_s) * self.rate_hz), self._place + 1)
+        slack_s = CLOCKS_DIFFER * max(came_s - self._came_s, 0.0)
+        self._zero_came_s = min(self._zero_came_s + slack_s, came_s - self._place / self.rate_hz)
         self._stamp_s, self._came_s = stamp_s, came_s
         return self._place
 
@@ -109,7 +118,10 @@ def read_stream(
                 f"{name}: its time stamps are {other_hz:.4g} frames a second, and the plan says "
                 f"{float(camera.fps):.6g}. Correct fps in the plan, or set the camera to it."
             )
-        first = first or picture
+        if first is None:
+            first = picture
+            for warning in level_warning(picture.header, camera.encoding):
+                noted(f"{name}: {warning}.")
         yield Frame(index=place, number=place, coded=in_codes(picture, camera.encoding))
     if first is None:
         raise PsvideoError(f"{name}: ended before its first whole frame. Start what sends it, then psvideo live again.")
@@ -141,8 +153,8 @@ def _decoded(
                 yield stamp_s, rgb_codes(Path(name), frame)
     except (av.FFmpegError, OSError, UnicodeDecodeError) as fault:
         if not came:
-            raise PsvideoError(f"{name}: cannot be read ({fault}). {_advice(source)}") from fault
-        noted(f"{name}: broke off ({fault}). What came until then was used.")
+            raise PsvideoError(f"{name}: cannot be read ({_why(fault)}). {_advice(source)}") from fault
+        noted(f"{name}: broke off ({_why(fault)}). What came until then was used.")
 
 
 def _whole_frames(
@@ -162,6 +174,11 @@ def _whole_frames(
         yield from frames
     if damaged:
         noted(f"{name}: {counted(damaged, 'frame')} came damaged or cut short, and {_were(damaged)} left out.")
+
+
+def _why(fault: Exception) -> str:
+    """Return what the system says of a fault, without its number and the name that it knows the source by."""
+    return str(getattr(fault, "strerror", None) or fault)
 
 
 def _were(count: int) -> str:

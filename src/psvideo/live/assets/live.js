@@ -142,7 +142,9 @@ function write(node, text) {
 
 function showStatus(told) {
   at("state").dataset.state = told.state;
-  write(at("state"), told.compiling || (told.state === "locked" ? told.verdict || "Locked" : SENTENCES[told.state]));
+  at("alarm").hidden = !told.alarm;
+  write(at("alarm"), told.alarm || "");
+  write(at("state-words"), told.compiling || (told.state === "locked" ? told.verdict || "Locked" : SENTENCES[told.state]));
   write(at("facts"), told.line === told.compiling ? "" : told.line);
   if (isNew("lines", told.lines)) at("lines").replaceChildren(...told.lines.map(({ subject, grade, sentence }) => {
     const line = document.createElement("li");
@@ -213,7 +215,8 @@ function connect() {
   socket.onopen = () => { seen = 0; askNext(); };
   socket.onclose = () => {
     at("state").dataset.state = "away";
-    at("state").textContent = "No connection to psvideo live";
+    at("alarm").hidden = true;
+    at("state-words").textContent = "No connection to psvideo live";
     setTimeout(connect, 1000);
   };
   socket.onmessage = ({ data }) => {
@@ -246,4 +249,4 @@ at("viewer").onpointermove = (moved) => {
 };
 globalThis.psvideoLive = { held, shareAfter, relit: () => stage.relitValues(look("relit", "normals", 1)) };
 if (stage) connect();
-else at("state").textContent = "This browser has no WebGL 2, which the live view needs.";
+else at("state-words").textContent = "This browser has no WebGL 2, which the live view needs.";

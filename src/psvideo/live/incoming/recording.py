@@ -110,10 +110,9 @@ class Recording:
         why = (fault.strerror or NO_ROOM) if isinstance(fault, OSError) else str(fault)
         (self.folder / FRAMES / f"live.{index + FIRST_NUMBER:06d}.tif").unlink(missing_ok=True)
         with self._changed:
-            self.ended = (
-                f"Recording ended after {self.written} frames, which are whole: the next could not be written "
-                f"({why}). Make room on the disk, and record again."
-            )
+            whole = f"after {counted(self.written, 'frame')}, which are whole: the next could not be written"
+            until = whole if self.written else "at once: not even the first frame could be written"
+            self.ended = f"Recording ended {until} ({why}). Make room on the disk, and record again."
             self._queue.clear()
             self._changed.notify_all()
 

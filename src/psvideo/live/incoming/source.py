@@ -31,7 +31,8 @@ class LiveSource:
     will tell.
     ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
     when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it, ``notes``
-    what happened to it on the way; ``check`` what to look at where no frames come.
+    what happened to it on the way; ``check`` what to look at where no frames come, ``slow_hint`` what else it may mean
+    that they come slowly.
     """
 
     name: str
@@ -45,6 +46,7 @@ class LiveSource:
     paced: bool = True
     warnings: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    slow_hint: str = ""
     check: str = "that the camera or the sender runs, its cable, and the address and port that it sends to"
 
 

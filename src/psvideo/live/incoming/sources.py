@@ -14,6 +14,7 @@ from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource, plain_kind, played_clip
+from psvideo.model.camera import Camera
 from psvideo.model.choices import Pace
 from psvideo.model.plan import Plan
 
@@ -42,10 +43,19 @@ def opened_source(
         found = _live(source, plan, lambda one: read_stream(source, one.camera, raw=raw, noted=said.append))
         explained = raw is not None and raw.startswith(PLAIN)
         kind = in_codes(stream_kind(raw), found.plan.camera.encoding)
-        return replace(found, notes=said, plan_path=plan if explained else None, kind=kind)
+        found = replace(found, notes=said, plan_path=plan if explained else None, kind=kind)
+        return found if raw is None else replace(found, slow_hint=_bare_bytes_hint(found.plan.camera, raw))
     if raw is not None:
         raise UsageError("`raw` says what bare bytes from standard input or the network hold; a clip's files say it.")
     return played_clip(open_clip(Path(source), plan=plan), pace=pace)
+
+
+def _bare_bytes_hint(camera: Camera, raw: str) -> str:
+    """Say that frames of another size, or of other pixels, would be cut wrongly: nobody sees that in bare bytes."""
+    return (
+        f"Or they are not {camera.width_px} x {camera.height_px} pixels of {raw}, as plan and `raw` say: bare bytes of "
+        "another size are cut at the wrong places, and show no strobe."
+    )
 
 
 def _live(
