@@ -16,7 +16,6 @@ from psvideo.solve.normals.trust import surroundings as of_around
 from psvideo.solve.normals.trust import thin_surface as thin
 from psvideo.solve.normals.trust import torn as of_torn
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
-from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.trust.judging_kernel import add_rows
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
@@ -49,7 +48,11 @@ def a_surface(lights: int, *, robust: bool, seed: int) -> tuple[ThinSurface, Evi
         plates=[np.zeros(SHAPE, np.float32)] * lights,
         lit=lit,
         usable=Usable(dark_level=0.003, shadow_ratio=0.0),
-        indirect=Indirect((counts * rng.normal(0.02, 0.03, SHAPE)).astype(np.float32), counts),
+        indirect=Indirect(
+            (counts * rng.normal(0.02, 0.03, SHAPE)).astype(np.float32),
+            counts,
+            (1 + counts * rng.random(SHAPE)).astype(np.float32),
+        ),
     )
     points = ThinSurface(
         step=1, surface=surface, noise_deg=noise, fit_deg=fit, fit_of_noise_deg=noise * np.float32(0.9)
@@ -64,13 +67,10 @@ def mean(plane: np.ndarray, width: int) -> np.ndarray:
 def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) -> Signs:
     """Return the signs by their formulas, in double precision, one operation after the other."""
     assert one.indirect is not None
-    sums, counts = (plane.astype(float) for plane in one.indirect)
+    sums, counts, wider = (plane.astype(float) for plane in one.indirect)
     known, lights, plain = points.known, len(one.plates), points.surface.error_deg is None
     albedo, noise_deg = (plane.astype(float) for plane in (points.brightness * known, points.noise_deg))
     fit = np.minimum(points.fit_deg, of_signs.MOST_FIT_DEG).astype(float)
-    strengths = one.lit.intensities.mean(axis=1)[:, None]
-    used = (lights - counts).astype(int)
-    wider = widened(one.lit.directions * strengths, of_signs.MOST_WIDENED).astype(float)[used]
     noise = points.fit_of_noise_deg.astype(float) ** 2 * (1 if plain else wider)
     squares = np.where(known, fit**2 - of_around.UNSURE_OF_NOISE * noise, 0)
     if turned_deg is not None:
@@ -78,7 +78,7 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
     widths = [thin.width_of(known, share) for share in (thin.AROUND, thin.FAR_AROUND)]
     shown = np.minimum(albedo, albedo.sum() / known.sum())
     common = (noise * albedo**2).sum() / (albedo**2).sum()
-    unsure = np.minimum(noise, common) * (plain | (used > 3))
+    unsure = np.minimum(noise, common) * (plain | (lights - counts > 3))
     outlying = of_around.OUTLYING_OF_ONE if lights == 4 else of_around.OUTLYING_OF_MORE
 
     def roots(of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -18,10 +18,12 @@ GRID_PX = 480
 
 class Indirect(NamedTuple):
     """Light that comes by way of other surfaces, as far as it shows: at every point at which a surface is judged, the
-    light of lamps that do not reach it, in units of albedo, summed, and their number."""
+    light of lamps that do not reach it, in units of albedo, summed, and their number; and by how much the square of
+    what noise makes of a normal is ``wider`` there than if all lamps reached it."""
 
     sums: Floats
     counts: Floats
+    wider: Floats
 
 
 class Left(NamedTuple):

@@ -9,13 +9,20 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.task import LIGHTS
+from psvideo.solve.normals.task import LIGHTS, Task
 
 
 def combined_noise(noise: PlateNoise, lit: Illumination) -> tuple[float, float]:
     """Return the variance of a measurement, its channels combined, in the dark, and what a unit of light adds."""
     dark, light = lit.noise_shares
     return noise.read * dark, noise.photon * light
+
+
+def with_noise(given: Task, lit: Illumination, noise: tuple[float, float]) -> Task:
+    """Return a task with the noise of every light's measurements, of which ``noise`` is what ``combined_noise`` gives:
+    where lights' colours differ, it is more under some than under others."""
+    each = np.stack([noise[0] * lit.noisiness**2, np.full(given.lights, noise[1])], axis=-1)
+    return given._replace(noise=np.pad(each, ((0, len(given.tone) - given.lights), (0, 0))).astype(np.float32))
 
 
 def light_sigmas(

@@ -133,7 +133,7 @@ class Solving:
             spare=self.spare,
             grid_px=self.grid_px,
         )
-        looks = IndirectLook.of(one)
+        looks = IndirectLook.of(one, noise)
         solved = self._solved(one, noise, looks)
         return solved, replace(one, indirect=looks.found, left=looks.left if looks.left.lights.size else None), noise
 

@@ -12,7 +12,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.light_sigmas import root_sigmas
+from psvideo.solve.normals.light_sigmas import root_sigmas, with_noise
 from psvideo.solve.normals.task import (
     FEW,
     Looks,
@@ -56,10 +56,7 @@ class Solution:
         check_arrays(shown.samples, lit, seen, mask)
         shown = shown.as_floats()  # one kind of samples, and so one loop to compile
         (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
-        as_it_is = task(shown.samples, lit, seen, mask, usable, black_level, scale)
-        read = noise[0] * lit.noisiness**2
-        noises = np.stack([read, np.full_like(read, noise[1])], axis=-1).astype(np.float32)
-        as_it_is = as_it_is._replace(noise=np.pad(noises, ((0, len(as_it_is.tone) - len(noises)), (0, 0))))
+        as_it_is = with_noise(task(shown.samples, lit, seen, mask, usable, black_level, scale), lit, noise)
         return cls(
             shown=shown,
             as_it_is=as_it_is,

@@ -21,18 +21,18 @@ TO_DEG = np.float32(180 / math.pi)
 
 @FUSED.kept
 def fill_squares(
-    fit_deg: Floats, of_noise_deg: Floats, known: Bytes, albedo: Floats, counts: Floats, wider: Floats, plain: bool,
+    fit_deg: Floats, of_noise_deg: Floats, known: Bytes, albedo: Floats, wider: Floats, plain: bool,
     unsure: float, most_deg: float, squares: Floats, noise: Floats, shown: Floats,
 ) -> None:  # fmt: skip
     """Fill ``squares`` with what residuals predict beyond ``unsure`` times what they would of noise, ``noise``, the
     square of that, and ``shown``, the albedo where anything is known.
 
-    ``counts`` are the lights that do not reach a point; ``wider`` (light + 1,) is by how much noise grows with those
-    that do, unless the fit is ``plain``, which uses all of them.
+    ``wider`` is by how much noise grows with the lights that reach a point, unless the fit is ``plain``, which uses all
+    of them.
     """
-    lights, margin, most = len(wider) - 1, np.float32(unsure), np.float32(most_deg)
+    margin, most = np.float32(unsure), np.float32(most_deg)
     for i in range(len(squares)):
-        grows = ONE if plain else wider[lights - int(counts[i])]
+        grows = ONE if plain else wider[i]
         noise[i] = of_noise_deg[i] * of_noise_deg[i] * grows
     for i in range(len(squares)):
         fit = min(fit_deg[i], most)

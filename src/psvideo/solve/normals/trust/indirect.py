@@ -1,5 +1,5 @@
-"""Light where lamps do not reach, and what normals leave of plates that are unsure, looked for while a solver has the
-rows: reading plates again would cost as much."""
+"""Light where lamps do not reach, how much farther noise spreads there, and what normals leave of plates that are
+unsure, looked for while a solver has the rows: reading plates again would cost as much."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,9 @@ import numpy as np
 
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.evidence import Evidence, Indirect, Left
+from psvideo.solve.normals.light_sigmas import combined_noise, with_noise
 from psvideo.solve.normals.loops.blocks import working_memory
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Result, Task, Work, task
 
 
@@ -22,15 +24,16 @@ class IndirectLook:
     left: Left
 
     @classmethod
-    def of(cls, one: Evidence) -> "IndirectLook":
-        """Begin with a round."""
+    def of(cls, one: Evidence, noise: PlateNoise) -> "IndirectLook":
+        """Begin with a round, whose plates hold this noise."""
         samples = ShownPlates.of(one.plates).as_floats().samples
         rows, cols = samples[0].shape[:2]
         step = one.step_of((rows, cols))
         shape = -(-rows // step), -(-cols // step)
-        found = Indirect(*np.zeros((2, *shape), np.float32))
+        found = Indirect(np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
         left = Left(*np.zeros((2, *((0, 0) if one.unsure is None else shape)), np.float32))
         given = task(samples, one.lit, one.seen, one.mask, one.usable, one.black_level, one.scale)
+        given = with_noise(given, one.lit, combined_noise(noise, one.lit))
         return cls(given=given, rows=rows, step=step, found=found, left=left)
 
     def memory(self) -> Work:

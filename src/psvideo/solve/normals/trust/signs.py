@@ -17,15 +17,12 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
-from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
 
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
-MOST_WIDENED = 5.0
-"""Where fewer lights reach, noise and what residuals predict of it spread farther: up to this many times the square."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 """Where motion turns normals by more, over this many points, residuals are its own, and no misfit of rig or surface."""
 UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
@@ -76,9 +73,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     if one.indirect is None:
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
     lights, plain = len(one.plates), points.surface.error_deg is None
-    strengths = one.lit.intensities.mean(axis=1)[:, None]
-    wider = widened(one.lit.directions * strengths, MOST_WIDENED)
-    squares, noise, shown = _beyond_noise(points, one.indirect.counts, wider)
+    squares, noise, shown = _beyond_noise(points, one.indirect.wider)
     still = points.known
     if turned_deg is not None:
         rests = cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
@@ -92,7 +87,6 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven)
-    used = (lights - one.indirect.counts).astype(np.intp)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -102,23 +96,23 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         torn_deg=torn_deg,
         likely_torn_deg=likely_torn_deg,
         noise_deg=points.noise_deg,
-        lost_deg=points.noise_deg * np.sqrt(wider - 1)[used],
+        lost_deg=points.noise_deg * np.sqrt(one.indirect.wider - 1),
         hidden=hidden_by(lights) / hidden_by(ENOUGH_LIGHTS),
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
     )
 
 
-def _beyond_noise(points: ThinSurface, counts: Floats, wider: Floats) -> tuple[Floats, Floats, Floats]:
+def _beyond_noise(points: ThinSurface, wider: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the squares of what residuals predict beyond noise, those of noise, and the albedo where anything is
-    known; ``counts`` lights do not reach a point, and ``wider`` is by how much noise grows with those that do."""
+    known; ``wider`` is by how much noise grows with the lights that reach a point."""
     from psvideo.solve.normals.trust.doubting_kernel import fill_squares
 
     squares, noise, shown = np.empty((3, *points.known.shape), np.float32)
     plain = points.surface.error_deg is None
     fill_squares(
         line(points.fit_deg), line(points.fit_of_noise_deg), points.known_bytes.reshape(-1), line(points.brightness),
-        line(counts), wider, plain, float(UNSURE_OF_NOISE), float(MOST_FIT_DEG), line(squares), line(noise),
+        line(wider), plain, float(UNSURE_OF_NOISE), float(MOST_FIT_DEG), line(squares), line(noise),
         line(shown),
     )  # fmt: skip
     return squares, noise, shown
@@ -151,7 +145,7 @@ def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
     alike for a vector, of which what lies across the normal turns it."""
     from psvideo.solve.normals.trust.doubting_kernel import fill_indirect_deg
 
-    near, far = (np.stack([blurred(plane, width) for plane in seen]).reshape(2, -1) for width in points.widths)
+    near, far = (np.stack([blurred(plane, width) for plane in seen[:2]]).reshape(2, -1) for width in points.widths)
     added = (np.linalg.pinv(one.lit.directions) @ np.ones(len(one.plates))).astype(np.float32)
     turned = np.empty(points.known.shape, np.float32)
     fill_indirect_deg(
