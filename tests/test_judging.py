@@ -12,6 +12,7 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
 from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, slope_agreement, surface_agreement
+from psvideo.solve.depth.view import View
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
@@ -23,6 +24,7 @@ from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import judged as judged_by_signs
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
+from psvideo.solve.normals.trust.torn import torn_angles_deg
 from psvideo.solve.normals.trust.unchecked import unchecked_deg
 
 SIZE = 96
@@ -257,6 +259,33 @@ def test_normals_that_belong_to_no_surface_are_doubted_and_steep_ones_are_not() 
     # 2 / 96 of a slope around every four points, over a radius of two and a half, as an angle
     assert np.median(swirl.torn_deg[middle]) == pytest.approx(np.degrees(2 / SIZE * 2.5), rel=0.25)
     assert (doubt_of_swirl[middle] > 1.5 * doubt_of_dome[middle]).all()
+
+
+def seen_through_a_wide_lens(focal_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normals of a ball aside of the axis, (row, col, 3), each along its pixel's ray, and where it is."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    ways = np.stack([cols / focal_px, -rows / focal_px, -np.ones((SIZE, SIZE))], axis=-1)
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    middle, radius = np.array([0.9, 0.8, -2.0]), 0.9
+    along = ways @ middle
+    off = along**2 - middle @ middle + radius**2
+    inside = off > 0.1 * radius**2
+    normals = ((along - np.sqrt(np.maximum(off, 0)))[..., None] * ways - middle) / radius
+    return np.where(inside[..., None], normals, [0, 0, 1]), inside
+
+
+def test_a_ball_that_a_wide_lens_sees_aside_of_its_axis_is_one_surface() -> None:
+    normals, inside = seen_through_a_wide_lens(0.5 * SIZE)
+    shown, nothing = normals.astype(np.float32), np.zeros((SIZE, SIZE), np.float32)
+    surface = Surface(normals=shown, albedo=inside.astype(np.float32), valid=inside, residual=None)
+    points = ThinSurface(step=1, surface=surface, noise_deg=nothing, fit_deg=nothing, fit_of_noise_deg=nothing)
+    whole = cv2.erode(inside.astype(np.uint8), np.ones((15, 15))) > 0
+    torn_deg, far_away_deg = (
+        torn_angles_deg(points, nothing, nothing, view, inside.shape)[0][whole]
+        for view in (View(focal_px=(0.5 * SIZE, 0.5 * SIZE)), View())
+    )
+    assert np.median(far_away_deg) > 0.5, "taken for a picture from far away it is none"
+    assert np.median(torn_deg) < 0.1
 
 
 def test_waves_that_shine_are_off_by_no_more_than_twice_what_three_lights_claim_and_are_trusted_as_before() -> None:

@@ -86,7 +86,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         changing_deg, _ = roots(_changes(points, noise, lights - 3), surroundings)
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
-    torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven)
+    torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
