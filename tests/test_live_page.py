@@ -21,6 +21,7 @@ from psvideo.live.showing.newest_pictures import NewestPictures, lit_rows
 from psvideo.live.showing.newest_result import NewestRound
 from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.live.showing.smaller import smaller_plan
+from psvideo.live.status import LiveState, LiveStatus
 from psvideo.live.watching import ENOUGH, LOOK_S, STARVED, Watching, told
 from psvideo.model.camera import Camera
 from psvideo.model.timing import timed_camera
@@ -48,6 +49,45 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     page = live_page(pictures, lambda: told(None, watching), port=0)
     yield page, pictures, results, camera, clip
     page.close()
+
+
+def status_of(*, fps: float, frames: int, state: LiveState = "locked") -> LiveStatus:
+    return LiveStatus(
+        at_s=9.0,
+        state=state,
+        fps=fps,
+        frames=frames,
+        lost=0,
+        results=9,
+        results_per_s=0.0,
+        age_s=None,
+        oldest_s=None,
+        phase_error_rows=None,
+        clock_offset_ppm=None,
+        order=None,
+        width_px=96,
+        height_px=72,
+        recorded=18,
+        record_ended=frames > 100,
+    )
+
+
+def test_a_page_says_in_large_type_that_no_frames_come_and_that_recording_ended(served: Served) -> None:
+    """Not that the take is usable: what it shows then is old."""
+    watching = Watching(plan=ps.open_take(served[4]).plan)
+    assert told(status_of(fps=0.0, frames=99), watching)["state"] == "silent"
+    assert told(status_of(fps=50.0, frames=99), watching)["state"] == "locked"
+    assert told(status_of(fps=0.0, frames=0, state="seeking"), watching)["state"] == "seeking"
+    assert told(status_of(fps=50.0, frames=99), watching)["alarm"] == ""
+    assert told(status_of(fps=50.0, frames=101), watching)["alarm"] == "Recording ended"
+
+
+def test_a_port_that_is_taken_is_named_with_the_systems_own_words_alone(served: Served) -> None:
+    taken = int(served[0].url.rsplit(":", 1)[1].strip("/"))
+    with pytest.raises(UsageError, match=rf"`port` {taken}: cannot be used on 127\.0\.0\.1 \(Address already in use\)"):
+        live_page(NewestPictures(), dict, port=taken)
+    with pytest.raises(UsageError, match=r"\(ports are 0 to 65535\)"):
+        live_page(NewestPictures(), dict, port=99999)
 
 
 def connected(url: str, **options: Any) -> Any:

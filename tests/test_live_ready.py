@@ -26,7 +26,8 @@ from psvideo.live.keeping_up import KeepingUp
 from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.result_times import ResultTimes
 from psvideo.live.running import Running
-from psvideo.live.showing.quality import first_quality
+from psvideo.live.showing.quality import LiveSecond, first_quality
+from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.standing import Counted
 from psvideo.live.status import SAID, LiveState, LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
@@ -233,6 +234,23 @@ def test_a_slow_source_is_said_once_it_was_slow_for_some_seconds_also_while_the_
         assert len(words) == 1
         assert words[0].startswith("pipe: its frames come at 30.0 a second, and the plan says 119.88")
         assert words[0].endswith("Or not.")
+
+
+def test_of_the_sizes_that_a_picture_had_the_last_is_said(make_plan: PlanMaker) -> None:
+    """A page beside it has no room for all that it was."""
+    keeping = KeepingUp(plan=make_plan(), source="camera", quality=first_quality(640, 480, mosaic=False))
+    late = LiveSecond(age_s=0.9, made_age_s=0.9, made_s=0.5, rate=2.0, rounds_per_s=20.0)
+    steps = []
+    for second in range(30):
+        status = standing(at_s=float(second), state="locked", fps=120.0, frames=99)
+        assert list(keeping.notes_on(status, late)) == []
+        steps.append(keeping.quality.step)
+    assert len(set(steps)) > 2
+    camera = smaller_plan(keeping.plan, steps[-1]).camera
+    assert (
+        keeping.size_words
+        == f"The live picture is now {camera.width_px} x {camera.height_px} pixels, smaller, to keep up."
+    )
 
 
 def test_one_late_result_of_a_second_is_late_though_most_are_not(make_plan: PlanMaker) -> None:

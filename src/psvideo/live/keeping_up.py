@@ -20,12 +20,13 @@ SETTLES_S = 3.0
 @dataclass(kw_only=True)
 class KeepingUp:
     """The live picture's ``quality`` after every second; ``source`` is the name of what gives the frames, ``slow_hint``
-    what else it may mean that they come slowly."""
+    what else it may mean that they come slowly; ``size_words`` say how large the picture has become."""
 
     plan: Plan
     source: str
     quality: Quality
     slow_hint: str = ""
+    size_words: str = ""
     _slow_s: int = 0
     _settled_s: float | None = None
 
@@ -41,7 +42,7 @@ class KeepingUp:
         if self.quality.step != before:
             word = "smaller, to keep up" if self.quality.step > before else "larger: there is time for it"
             camera = smaller_plan(self.plan, self.quality.step).camera
-            yield f"The live picture is now {camera.width_px} x {camera.height_px} pixels, {word}."
+            self.size_words = f"The live picture is now {camera.width_px} x {camera.height_px} pixels, {word}."
 
     def _slow_notes(self, status: LiveStatus) -> Iterator[str]:
         """Say once that frames come slowly; that none comes is said elsewhere."""

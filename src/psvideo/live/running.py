@@ -260,7 +260,7 @@ class Running:
             times=self.times,
             recording=self.recording,
             holding=self.holding,
-            notes=(*self.source.notes, *self.notes),
+            notes=(*self.source.notes, *self.notes, *filter(None, [self._keeping_up.size_words])),
         )
 
     @property

@@ -55,6 +55,11 @@ class LiveStatus:
     notes: tuple[str, ...] = ()
 
     @property
+    def silent(self) -> bool:
+        """Whether frames came, and none in the last second."""
+        return self.state != "preparing" and self.frames > 0 and not self.fps
+
+    @property
     def all_words(self) -> tuple[str, ...]:
         """What is missing, and what else there is to say of the run."""
         return (*filter(None, [self.waits_for]), *self.notes)
@@ -64,7 +69,7 @@ class LiveStatus:
         """One line for a terminal."""
         if self.state == "preparing":
             return self.compiling or SAID[self.state]
-        comes = f"{self.fps:.1f} fps" if self.fps or not self.frames else "NO FRAMES COME"
+        comes = "NO FRAMES COME" if self.silent else f"{self.fps:.1f} fps"
         guessed = "NAMES OF LIGHTS ARE A GUESS" if self.order == "guess" else ""
         parts = [SAID[self.state], *filter(None, (guessed, self.compiling)), comes]
         if self.phase_error_rows is not None and self.clock_offset_ppm is not None:

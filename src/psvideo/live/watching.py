@@ -119,7 +119,7 @@ def told(status: LiveStatus | None, watching: Watching) -> dict[str, object]:
     """Return what a page says beside its pictures: how things stand, the gravest lines first, histograms by light."""
     lines = (*gravest_first(watching.lines), *(one for one in watching.lines if one.grade in ("good", "unknown")))
     return {
-        "state": "preparing" if status is None else status.state,
+        "state": _told_state(status),
         "line": "" if status is None else status.line,
         "alarm": "Recording ended" if status is not None and status.record_ended else "",
         "compiling": "" if status is None else status.compiling,
@@ -130,3 +130,10 @@ def told(status: LiveStatus | None, watching: Watching) -> dict[str, object]:
         "powers": watching.powers,
         "lights": list(watching.plan.lights),
     }
+
+
+def _told_state(status: LiveStatus | None) -> str:
+    """Return the state as a page shows it: pictures of a source that fell silent are old, whatever they show."""
+    if status is None:
+        return "preparing"
+    return "silent" if status.silent else status.state

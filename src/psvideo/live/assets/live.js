@@ -8,7 +8,7 @@ const at = (id) => document.getElementById(id);
 const stage = openStage(at("picture"));
 const held = {};
 const light = { name: "Light", direction: directionAt(0.45, 0.5), colour: "#ffffff", intensity: 1, near: false, distance: 1 };
-const SENTENCES = { preparing: "Getting ready", seeking: "Looking for the strobe", locked: "Locked", unsure: "Not sure of the strobe", lost: "Strobe lost" };
+const SENTENCES = { preparing: "Getting ready", seeking: "Looking for the strobe", locked: "Locked", unsure: "Not sure of the strobe", lost: "Strobe lost", silent: "No frames come" };
 let socket = null;
 let seen = 0;
 let drawn = 0;
@@ -57,7 +57,7 @@ function look(kind, main, exposure) {
 // The panes that there are pictures for, the first the largest.
 function paneLooks() {
   const panes = [];
-  if (held.normals && held.albedo) panes.push(["relit: move the light with the mouse", look("relit", "normals", held.albedo.facts.exposure)]);
+  if (held.normals && held.albedo) panes.push(["relit: the light follows the pointer", look("relit", "normals", held.albedo.facts.exposure)]);
   if (held.normals) panes.push(["normals", look("normals", "normals", 1)]);
   if (held.plate) panes.push([`plate: ${held.plate.facts.light}`, look("light", "plate", held.plate.facts.exposure)]);
   if (held.frame) panes.push(["frame", look("light", "frame", held.frame.facts.exposure)]);
@@ -216,6 +216,7 @@ function connect() {
   socket.onclose = () => {
     at("state").dataset.state = "away";
     at("alarm").hidden = true;
+    write(at("facts"), "");
     at("state-words").textContent = "No connection to psvideo live";
     setTimeout(connect, 1000);
   };

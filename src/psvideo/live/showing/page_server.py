@@ -7,6 +7,7 @@ this server as its host, and a WebSocket must come from this very page: no forei
 import contextlib
 import hmac
 import json
+import os
 import secrets
 import threading
 import time
@@ -150,7 +151,7 @@ def live_page(
                 page._serve, host, candidate, process_request=page._answer, compression=None, server_header=None
             )
         except (OSError, OverflowError) as fault:
-            reason = getattr(fault, "strerror", None) or str(fault)
+            reason = os.strerror(fault.errno) if isinstance(fault, OSError) and fault.errno else "ports are 0 to 65535"
             continue
         threading.Thread(target=page._server.serve_forever, name="psvideo live page", daemon=True).start()
         return page
