@@ -33,6 +33,7 @@ WAIT_S = 1.0
 """A viewer who has seen the newest hears how things stand after this long."""
 LOCAL = (ADDRESS, "localhost")
 LIVE_PORT = 8788
+LAST_PORT = 65535
 Told = Callable[[], Mapping[str, object]]
 
 
@@ -142,6 +143,8 @@ def live_page(
             "The live page needs the library websockets, which is not installed. Install psvideo with it (python -m "
             "pip install 'psvideo[live]'), or use `no_page`."
         ) from None
+    if port is not None and not 0 <= port <= LAST_PORT:
+        raise UsageError(f"`port` {port}: ports are 0 to {LAST_PORT}. Name another one, or leave `port` out.")
     secret = "" if host in LOCAL and token is None else token or secrets.token_urlsafe(12)
     page = LivePage(pictures=pictures, told=told, host=host, token=secret, ball=ball, _files=_files())
     reason: str | None = None
@@ -150,8 +153,8 @@ def live_page(
             page._server = serve(
                 page._serve, host, candidate, process_request=page._answer, compression=None, server_header=None
             )
-        except (OSError, OverflowError) as fault:
-            reason = os.strerror(fault.errno) if isinstance(fault, OSError) and fault.errno else "ports are 0 to 65535"
+        except OSError as fault:
+            reason = os.strerror(fault.errno) if fault.errno else str(fault)
             continue
         threading.Thread(target=page._server.serve_forever, name="psvideo live page", daemon=True).start()
         return page
