@@ -99,3 +99,19 @@ def test_what_weak_lamps_hold_of_noise_is_claimed_once(strengths: tuple[float, .
     fitted = np.linalg.lstsq(directions * np.array(strengths)[:, None], images.reshape(len(images), -1), rcond=None)[0]
     best_deg = angles_deg(fitted.T.reshape(normals.shape), normals)
     assert off_deg.mean() < 1.15 * best_deg.mean(), "noise is alike under all lamps: plain least squares is best"
+
+
+@pytest.mark.parametrize("strengths", [(1, 1, 0.1, 1), (1, 1, 0.3, 1), (1, 1, 1, 1)], ids=str)
+def test_a_weak_lamp_among_four_shows_a_wrong_rig_by_little_light(strengths: tuple[float, ...]) -> None:
+    """What three strong lamps and a weak one leave over is the weak one's, and as small as that is."""
+    normals = shapes()[1][1]
+    images, directions, _ = shot(np.array(strengths), normals)
+    across = np.random.default_rng(2).normal(size=directions.shape)
+    across -= np.sum(across * directions, axis=1, keepdims=True) * directions
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    claimed = np.cos(np.radians(2)) * directions + np.sin(np.radians(2)) * across
+    surface = ps.solve_images(images, claimed, intensities=np.array(strengths))
+    assert surface.error_deg is not None
+    off_deg = angles_deg(surface.normals, normals)
+    assert (off_deg <= 2 * surface.error_deg).mean() >= 0.9
+    assert np.median(surface.error_deg) < 2.5 * np.median(off_deg)

@@ -143,6 +143,23 @@ def _thin_shape(surface: Surface, one: Evidence) -> tuple[int, int]:
     return -(-rows // step), -(-cols // step)
 
 
+def _told_by_residuals(matrix: NDArray[np.float64], sigmas: NDArray[np.float64]) -> tuple[float, float]:
+    """Return how many times more a plain fit's residuals say of a normal that faces the camera than if all lights
+    (light, 3) were equally strong, and how many times more they hold of noise then (``sigmas``, of each light beside
+    the others).
+
+    What is not matte, or a wrong rig, is off with a lamp's strength, and turns normals by strong lamps' plates; a weak
+    lamp among four shows most of what is left over, and that is little as such.
+    """
+    strengths = np.linalg.norm(matrix, axis=1)
+    strengths = strengths / strengths.mean()
+    solving, left = np.linalg.pinv(matrix)[:2], np.linalg.qr(matrix, mode="complete")[0][:, 3:]
+    turned, by_noise = (float(((solving * each) ** 2).sum()) for each in (strengths, sigmas))
+    shown, of_noise = (float(((left.T * each) ** 2).sum()) / left.shape[1] for each in (strengths, sigmas))
+    told = np.sqrt(turned / by_noise / shown)
+    return float(told), float(told * np.sqrt(of_noise))
+
+
 def _typical_light(surface: Surface, one: Evidence) -> float:
     """Return the albedo that is typical of the brighter half of a surface."""
     step = one.step_of(surface.valid.shape)
@@ -195,6 +212,7 @@ class _Spread:
         variances = [noise.read / channels, photon * mean, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
         plain = surface.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
+        told, told_noise = _told_by_residuals(matrix, sigmas) if plain else (1.0, 1.0)
         return cls(
             step=one.step_of(surface.valid.shape),
             noise=Spread(
@@ -206,9 +224,9 @@ class _Spread:
                 dim=near.dim,
                 wider=near.wider,
             ),
-            of_noise=how.fit_noise * float(np.sqrt(many)),
-            typical_of_noise=how.fit_noise * float(np.sqrt(many)) / (how.held if plain else 1.0),
-            of_residual=how.fit_noise / how.held * float(np.sqrt(many * lights / free)) if plain else 0.0,
+            of_noise=how.fit_noise * float(np.sqrt(many)) * told_noise,
+            typical_of_noise=how.fit_noise * float(np.sqrt(many)) * told_noise / (how.held if plain else 1.0),
+            of_residual=how.fit_noise / how.held * float(np.sqrt(many * lights / free)) * told if plain else 0.0,
         )
 
     def fit(self, surface: Surface) -> Samples:
