@@ -35,6 +35,7 @@ from psvideo.plates.spread import rounds_spread, spread_over
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.rigpoints import PointLight
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.runs.instants import piece_frames
@@ -313,7 +314,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
         counts={"a": np.arange(5), "b": np.arange(5) * 2},
         blurs_px=[0.7],
         leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
-        light_at_points=[np.random.default_rng(1).random((4, 2))],
+        light_at_points=[PointLight(np.random.default_rng(1).random((4, 2)), np.array([1.0, 4.0]))],
         in_shadow=[0.04],
         ambient_measured={128: 0.25},
         worst=Worst([worst]),
@@ -326,7 +327,8 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     assert (seen.blurs_px, seen.ambient_measured) == ([0.7], {128: 0.25})
     assert (seen.leans, seen.in_shadow) == (observed.leans, [0.04])
     assert all(np.array_equal(seen.counts[light], observed.counts[light]) for light in observed.counts)
-    assert np.array_equal(seen.light_at_points[0], observed.light_at_points[0])
+    assert np.array_equal(seen.light_at_points[0].light, observed.light_at_points[0].light)
+    assert seen.light_at_points[0].white.tolist() == [1.0, 4.0]
     assert found.picture is not None
     assert np.array_equal(found.picture, picture)
     assert [(one.number, one.badness, one.why) for one in seen.thumbnails] == [(1003, 0.7, "67 % valid")]

@@ -63,7 +63,8 @@ class Footage:
         by how much all are turned around the axis, and around the picture's rows; what it says of the first light's
         strength. near: how many picture widths away the lights stand, which the rig takes for distant. recorded: by
         which curve: "srgb" where sRGB was read as light, "undone" where light was read as sRGB. sheen: what is mirrored
-        head on beside the albedo, and how narrowly (the cosine's power). solved: whether normals are needed.
+        head on beside the albedo, and how narrowly (the cosine's power). solved: whether normals are needed. powers:
+        of each light, for which the plan has it weaker than full; plates are at full power.
     """
 
     shape: str = "ball"
@@ -91,6 +92,7 @@ class Footage:
     solved: bool = False
     fill: bool = True
     backdrop: float = 0.0
+    powers: Sequence[float] = (1.0,)
 
     def observed(self, seed: int) -> Observed:
         """Film it, solve it where that is asked for, and return what a run observes."""
@@ -100,7 +102,8 @@ class Footage:
         names = tuple(one.name for one in rig.lights)
         points = rig_points(plan_of(names), rig, height_px=SIZE, width_px=SIZE, channels=1) if self.solved else None
         observed = Observed(lights=names, points=points)
-        lit = Illumination(directions=claimed, intensities=np.array([one.intensity for one in rig.lights], np.float64))
+        strengths = [share * one.intensity[0] for share, one in zip(self._shares, rig.lights, strict=True)]
+        lit = Illumination(directions=claimed, intensities=np.array(strengths)[:, None])
         for n in range(self.rounds):
             clean = self._plates(ways, n)
             noisy = [(one + rng.normal(0, self.noise, one.shape)).astype(np.float32) for one in clean]
@@ -112,6 +115,10 @@ class Footage:
                 observed.look_at_window(Separated(begins=0, image=image, stood=stood, known=np.ones(SIZE, np.bool_)))
             observed.add(one, Solving(error=True, fill=self.fill).solve(plates, lit) if self.solved else None)
         return observed
+
+    @property
+    def _shares(self) -> list[float]:
+        return [self.powers[n % len(self.powers)] for n in range(self.lights)]
 
     def _claimed(self, ways: np.ndarray, seed: int) -> tuple[np.ndarray, Rig]:
         across = np.random.default_rng(100 + seed).normal(size=ways.shape)
@@ -170,12 +177,14 @@ class Footage:
     def _round(self, names: Sequence[str], plates: Sequence[np.ndarray], clean: Sequence[np.ndarray], n: int) -> Round:
         seen = np.arange(SIZE) >= self.unseen * SIZE
         shown_s = np.where(np.arange(SIZE) < self.borrowed * SIZE, n - 1.0, float(n)) if self.borrowed else None
+        full = [np.asarray(plate / share, np.float32) for plate, share in zip(plates, self._shares, strict=True)]
         taken = tuple(
             LightPlate(
-                light=name, number=1001 + n, time_s=float(n), picture=mixture_of(plate), seen=seen, shown_s=shown_s
+                light=name, number=1001 + n, time_s=float(n), picture=mixture_of(plate), seen=seen, shown_s=shown_s,
+                saturation=1 / share, brightest_share=share,
             )
-            for name, plate in zip(names, plates, strict=True)
-        )
+            for name, plate, share in zip(names, full, self._shares, strict=True)
+        )  # fmt: skip
         dark = None
         if self.ambient and self.measured is None:
             level = np.full((SIZE, SIZE), self._dark_level(clean, n), np.float32)
@@ -737,7 +746,8 @@ def test_a_rig_is_fitted_once_until_more_is_seen() -> None:
     fit = seen.rig_fit
     assert fit is not None
     assert seen.rig_fit is fit  # a report asks three times
-    seen.light_at_points.append(0.5 * seen.light_at_points[0])
+    dimmed = seen.light_at_points[0]
+    seen.light_at_points.append(dimmed._replace(light=0.5 * dimmed.light))
     wider = seen.rig_fit
     assert wider is not fit
     assert wider is not None
@@ -1023,3 +1033,46 @@ def test_the_report_says_how_sure_flash_times_are_as_the_timing_does(known: dict
     report: Any = SimpleNamespace(timing=timing)
     assert f"<td>{words}</td>" in _timing(report)
     assert timing.how_sure == ("" if words == "not fitted" else f"Flash times are known to {words}.")
+
+
+ALL_WEAKER, ONE_WEAKER = (0.3,), (1.0, 0.1, 1.0, 1.0)
+"""Powers of four lights in a plan. Their plates are at full power, so that saturation lies at 3.3 and at 10."""
+
+
+@pytest.mark.parametrize("powers", [ALL_WEAKER, (0.2, 0.5, 1.0, 0.3)])
+@pytest.mark.parametrize("shape", ["ball", "waves"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_right_curve_is_not_doubted_where_flashes_are_weaker_than_full(
+    shape: str, powers: Sequence[float], seed: int
+) -> None:
+    """All that lay above 1.0 was bent to one value, which any rig explains."""
+    right, wrong = (
+        Footage(
+            shape=shape, lights=4, noise=0.0002, gains=powers, powers=powers, recorded=recorded, solved=True
+        ).observed(seed)
+        for recorded in ("linear", "srgb")
+    )
+    assert graded(rig_of(right), "rig") == "good"
+    assert any("recorded as sRGB" in line.found for line in rig_of(wrong))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_light_that_the_plan_itself_sets_weak_is_not_held_against_the_rig(seed: int) -> None:
+    gains = [1.0, 0.1, 1.0, 1.0]
+    as_planned, weaker = (
+        lamps(Footage(lights=4, gains=gains, powers=powers, solved=True).observed(seed))
+        for powers in (ONE_WEAKER, (1.0,))
+    )
+    assert graded(as_planned, "lights") == "doubtful"  # its noise is larger, and no more
+    assert graded(weaker, "lights") == "bad"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("powers", [(1.0,), ALL_WEAKER])
+def test_ambient_light_is_compared_with_what_the_flash_gave_not_with_a_full_one(
+    powers: Sequence[float], seed: int
+) -> None:
+    just_good, just_bad = (
+        ambient(Footage(lights=4, ambient=[share], powers=powers).observed(seed)) for share in (0.09, 0.11)
+    )
+    assert (just_good.grade, just_bad.grade) == ("good", "doubtful")

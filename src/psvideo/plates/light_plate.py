@@ -17,6 +17,7 @@ class LightPlate:
 
     ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full. It
     is so bright at least, or ``unmixed``: a difference of flashes, of which one was clipped, and may be anything.
+    ``brightest_share`` is what the brightest flash of its light in a round gives of the full one.
     ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
     show ``time_s``. ``sideways`` is a picture that was turned by a quarter: the sensor's rows are its columns.
     ``filled`` (row, col) is what ``clipped_flashes`` said of an ``unmixed`` plate before it was turned or given rows
@@ -30,6 +31,7 @@ class LightPlate:
     seen: NDArray[np.bool_]
     saturation: float = 1.0
     unmixed: bool = False
+    brightest_share: float = 1.0
     shown_s: Doubles | None = None
     sideways: bool = False
     filled: Bytes | None = None

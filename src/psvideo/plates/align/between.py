@@ -88,6 +88,7 @@ def plate_at(
         picture=packed(mixture_of(image), own.saturation, put_by, span=span),
         seen=seen,
         saturation=own.saturation,
+        brightest_share=own.brightest_share,
         shown_s=own.flashed_s,
         sideways=own.sideways,
     )

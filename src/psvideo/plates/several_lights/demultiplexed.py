@@ -6,7 +6,7 @@ or durations (HDR), is merged: what is saturated is left out and the rest is sum
 light's full flash is power 1 for its longest planned duration.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,7 +58,8 @@ def plate_of_light(making: Making, lit: dict[int, Plate], number: int) -> LightP
     parts = [lit[slot] for slot in making.shares]
     if making.alone:
         return _merged(parts, np.array(list(making.exposures.values())), making.light, number)
-    return _mixed(parts, np.array(list(making.shares.values())), making.light, number)
+    plate = _mixed(parts, np.array(list(making.shares.values())), making.light, number)
+    return replace(plate, brightest_share=max(making.exposures.values()))
 
 
 def _merged(parts: list[Plate], exposures: Doubles, light: str, number: int) -> LightPlate:
@@ -85,7 +86,13 @@ def _merged(parts: list[Plate], exposures: Doubles, light: str, number: int) -> 
         picture = mixture_of(merged)
     time_s = _time_s(parts, exposures)
     return LightPlate(
-        light=light, number=number, time_s=time_s, picture=picture, seen=seen, saturation=float(1 / exposures.min())
+        light=light,
+        number=number,
+        time_s=time_s,
+        picture=picture,
+        seen=seen,
+        saturation=float(1 / exposures.min()),
+        brightest_share=float(exposures.max()),
     )
 
 

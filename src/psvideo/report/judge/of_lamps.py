@@ -76,11 +76,13 @@ def _brightest(observed: Observed) -> NDArray[np.float64]:
 
 
 def _claimed(observed: Observed) -> NDArray[np.float64]:
-    """Return what the rig says that every lamp gives, as a share of the strongest; zeros where that is not known, or
-    where there are enough others to find out."""
+    """Return what the rig says that every lamp gives at the plan's power, as a share of the strongest; zeros where that
+    is not known, or where there are enough others to find out."""
     if observed.points is None or len(observed.lights) >= CHECKED_FROM:
         return np.zeros(len(observed.lights))
     strengths = np.linalg.norm(observed.points.vectors, axis=2).mean(axis=0)
+    whites = [one.white for one in observed.facts if len(one.white) == len(strengths)]
+    strengths = strengths / (np.median(whites, axis=0) if whites else 1.0)
     return np.asarray(strengths / max(float(strengths.max()), 1e-12))
 
 

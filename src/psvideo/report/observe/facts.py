@@ -130,7 +130,15 @@ def instant_facts(
         levels=tuple(level / white for level, white in zip(levels, whites, strict=True)),
         clipped=tuple(shares),
         white=tuple(whites),
-        ambient=_ambient_share(dark, subject, [float(light.mean()) for light in lights if light.size]),
+        ambient=_ambient_share(
+            dark,
+            subject,
+            [
+                float(light.mean()) * plate.brightest_share
+                for light, plate in zip(lights, one.plates, strict=True)
+                if light.size
+            ],
+        ),
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,

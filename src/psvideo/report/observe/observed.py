@@ -28,7 +28,7 @@ from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import BINS, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
-from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
+from psvideo.report.observe.rig_and_curve.rigpoints import PointLight, RigPoints
 from psvideo.report.observe.rig_and_curve.slopes import Averaged, coarse_normals, share_away, surface_agreement
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
 from psvideo.report.observe.shadow import shadow_light
@@ -88,7 +88,7 @@ class Observed:
     leans: list[Lean] = field(default_factory=list)
     in_shadow: list[float] = field(default_factory=list)
     astray: list[Astray] = field(default_factory=list)
-    light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
+    light_at_points: list[PointLight] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: "array[float]" = field(default_factory=_numbers)
     dark_evenness: "array[float]" = field(default_factory=_numbers)

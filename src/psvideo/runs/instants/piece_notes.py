@@ -21,6 +21,7 @@ from psvideo.report.observe.alignment.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.rigpoints import PointLight
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.runs.instants.job import Found
@@ -55,7 +56,8 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "worst": [{"number": one.number, "badness": one.badness, "why": one.why} for one in seen.thumbnails],
         "reserved": found.reserved,
     }
-    arrays: dict[str, NDArray[Any]] = {f"light{n}": light for n, light in enumerate(seen.light_at_points)}
+    arrays: dict[str, NDArray[Any]] = {f"light{n}": one.light for n, one in enumerate(seen.light_at_points)}
+    arrays |= {f"white{n}": one.white for n, one in enumerate(seen.light_at_points)}
     arrays |= {f"normals{n}": one.normals for n, one in enumerate(seen.thumbnails)}
     arrays |= {f"valid{n}": one.valid for n, one in enumerate(seen.thumbnails)}
     if found.picture is not None:
@@ -130,7 +132,7 @@ def _read(path: Path) -> tuple[range, Found]:
             slopes=record["slopes"],
             away=record["away"],
             leans=list(LEANS.validate_python(record["leans"])),
-            light_at_points=[arrays[f"light{n}"] for n in range(len(lights))],
+            light_at_points=[PointLight(arrays[f"light{n}"], arrays[f"white{n}"]) for n in range(len(lights))],
             in_shadow=record["in_shadow"],
             astray=list(ASTRAY.validate_python(record["astray"])),
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},

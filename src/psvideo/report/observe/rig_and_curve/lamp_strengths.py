@@ -15,7 +15,7 @@ SHADOW = 0.1
 """A light reaches a point that gets this share of the brightest one's from it."""
 WEAK, FAINT = 0.25, 0.01
 """A light that the rig says is weaker than the first share of the strongest reaches a point by what it sends, too. Less
-light than the second, of full scale, says nothing of such a light: black levels are off by up to a tenth of it."""
+light than the second, of saturation, says nothing of such a light: black levels are off by up to a tenth of it."""
 LEAST_POINTS, MOST_POINTS = 100, 800
 """Of fewer, under every light, nothing is said; more than the second are not needed."""
 FEWEST_LIGHTS = 8
@@ -35,21 +35,22 @@ class LampStrengths:
     turned_deg: float
 
 
-def reaches(light: Doubles, vectors: Doubles, share: float) -> NDArray[np.bool_]:
+def reaches(light: Doubles, vectors: Doubles, share: float, *, white: Doubles | float) -> NDArray[np.bool_]:
     """Return which lights reach a point, (point, light): they give more than a share of the brightest one's ``light``,
-    as it is or, of lights that the rig calls weak, over what it sends, ``vectors`` (point or 1, light, 3)."""
+    as it is or, of lights that the rig calls weak, over what it sends, ``vectors`` (point or 1, light, 3). ``white``
+    (point, light) is the light that saturates."""
     sizes = np.maximum(np.linalg.norm(vectors, axis=2), 1e-12)
     even = light / sizes
-    by_rig = (even > share * even.max(axis=1, keepdims=True)) & (light > FAINT)
+    by_rig = (even > share * even.max(axis=1, keepdims=True)) & (light > FAINT * white)
     weak = sizes < WEAK * sizes.max(axis=1, keepdims=True)
     return np.asarray((light > share * light.max(axis=1, keepdims=True)) | (by_rig & weak))
 
 
-def lamp_strengths(light: Doubles, vectors: Doubles) -> LampStrengths | None:
-    """Return the strengths that explain points best: ``light`` (point, light), 0 where it is not known, and
-    ``vectors`` (point or 1, light, 3), what the rig sends there. None under fewer than FEWEST_LIGHTS, or where
-    a light reaches too few points."""
-    used = reaches(light, vectors, SHADOW) & (light > 0)
+def lamp_strengths(light: Doubles, vectors: Doubles, *, white: Doubles | float = 1.0) -> LampStrengths | None:
+    """Return the strengths that explain points best: ``light`` (point, light), 0 where it is not known, of ``white``
+    (point, light) where it saturates, and ``vectors`` (point or 1, light, 3), what the rig sends there. None under
+    fewer than FEWEST_LIGHTS, or where a light reaches too few points."""
+    used = reaches(light, vectors, SHADOW, white=white) & (light > 0)
     enough = np.flatnonzero(used.sum(axis=1) >= LEAST_REACHED)
     if light.shape[1] < FEWEST_LIGHTS or len(enough) < LEAST_POINTS:
         return None

@@ -25,18 +25,19 @@ class OtherCurves:
     redone: float
 
 
-def other_curves(light: Doubles, beyond: Doubles) -> OtherCurves:
-    """Return what points (point, light), 1.0 = saturation, leave over under other curves; ``beyond`` projects to what
-    no normal explains, (light, light)."""
+def other_curves(light: Doubles, beyond: Doubles, *, white: Doubles) -> OtherCurves:
+    """Return what points (point, light) leave over under other curves, which bend what the sensor saw: the share of the
+    light that saturates, ``white`` (point, light). ``beyond`` projects to what no normal explains, (light, light)."""
+    share = light / white
     steps = np.linspace(0, 1, STEPS) ** 2.4  # as finely where sRGB is steep
     signals = srgb_share(steps.astype(np.float32))
-    undone = np.interp(light, signals, steps)
+    undone = np.interp(share, signals, steps) * white
     reached = undone.min(axis=1) > SHADOW * undone.max(axis=1)  # shadow that sRGB makes brighter is shadow after all
     if reached.sum() < LEAST_POINTS:
         reached[:] = True
     return OtherCurves(
         undone=_left_over(undone[reached], beyond),
-        redone=_left_over(np.interp(light, steps, signals), beyond),
+        redone=_left_over(np.interp(share, steps, signals) * white, beyond),
     )
 
 

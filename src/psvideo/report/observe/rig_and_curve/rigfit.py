@@ -18,7 +18,7 @@ from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
 from psvideo.report.observe.rig_and_curve.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
 
 LEAST_LIGHT = 4.0
-"""A pixel is lit where its brightest light gives at least this many times the light of 0.001."""
+"""A pixel is lit where its brightest light gives at least this many thousandths of what saturates."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,14 +46,17 @@ class RigFit:
         return float(np.sqrt(max(self.misfit**2 - self.own_misfit**2, 0.0)))
 
 
-def rig_fit(light: Doubles, vectors: Doubles, places: Doubles | None = None) -> RigFit | None:
+def rig_fit(
+    light: Doubles, vectors: Doubles, places: Doubles | None = None, *, white: Doubles | None = None
+) -> RigFit | None:
     """Judge a rig by points: ``light`` (point, light) is unclipped, ``vectors`` (point or 1, light, 3) what the rig
-    sends there, and ``places`` (point, 2) where they lie, x right and y up in widths of the picture. None for three
-    lights, or where too few points are reached by all of them."""
+    sends there, and ``places`` (point, 2) where they lie, x right and y up in widths of the picture; ``white`` (point,
+    light) is the light that saturates, left out 1.0. None for three lights, or where too few points are reached by all
+    of them."""
     count = light.shape[1]
-    peak = light.max(axis=1)
-    lit = peak > LEAST_LIGHT * 1e-3
-    reached = reaches(light, vectors, SHADOW).all(axis=1) & lit
+    white = np.ones_like(light) if white is None else white
+    lit = (light / white).max(axis=1) > LEAST_LIGHT * 1e-3
+    reached = reaches(light, vectors, SHADOW, white=white).all(axis=1) & lit
     if count < 4 or reached.sum() < LEAST_POINTS:
         return None
     unit = light[reached] / np.linalg.norm(light[reached], axis=1, keepdims=True)
@@ -72,13 +75,13 @@ def rig_fit(light: Doubles, vectors: Doubles, places: Doubles | None = None) -> 
     near = curves = pair = None
     if places is not None and len(vectors) == 1:
         near = nearness(unit, beyond[0], vectors[0], places[reached])
-        curves = other_curves(light[reached], beyond[0])
+        curves = other_curves(light[reached], beyond[0], white=white[reached])
         pair = exchanged(moments, beyond[0])
     scaled = float(np.sqrt(max(share, 0)))
     return RigFit(
         misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves,
         exchanged=pair,
-        lamps=lamp_strengths(light[lit], vectors if len(vectors) == 1 else vectors[lit]),
+        lamps=lamp_strengths(light[lit], vectors if len(vectors) == 1 else vectors[lit], white=white[lit]),
     )  # fmt: skip
 
 

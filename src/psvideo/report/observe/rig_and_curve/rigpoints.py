@@ -1,6 +1,8 @@
 """Points of the picture at which the rig is held against the plates, for distant and for near lights."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,14 @@ CHANNEL = 1
 """Colour pictures are judged by their green."""
 
 
+class PointLight(NamedTuple):
+    """The ``light`` of a round at points under each light's full flash, (point, light), 0 where a plate is clipped or
+    was not seen, and the light at which its plates are clipped, ``white`` (light,)."""
+
+    light: Doubles
+    white: Doubles
+
+
 @dataclass(frozen=True, kw_only=True)
 class RigPoints:
     """Pixels (point,) as ``rows`` and ``cols``, and what the rig sends there under each light's full flash, ``vectors``
@@ -26,8 +36,8 @@ class RigPoints:
     cols: NDArray[np.intp]
     vectors: Doubles
 
-    def light(self, one: Round) -> Doubles:
-        """Return the light of a round at the points, (point, light); 0 where a plate is clipped or was not seen."""
+    def light(self, one: Round) -> PointLight:
+        """Return the light of a round at the points."""
         columns = []
         for plate in one.plates:
             needed, place = np.unique(self.rows, return_inverse=True)
@@ -36,16 +46,20 @@ class RigPoints:
             value = image[place, self.cols].astype(np.float64)
             known = plate.pixels_seen[self.rows, self.cols] & (value < plate.saturation)
             columns.append(np.where(known, value, 0.0))
-        return np.stack(columns, axis=1)
+        return PointLight(np.stack(columns, axis=1), np.array([plate.saturation for plate in one.plates]))
 
-    def fit(self, light: list[Doubles], firing: NDArray[np.bool_]) -> RigFit | None:
+    def fit(self, seen: Sequence[PointLight], firing: NDArray[np.bool_]) -> RigFit | None:
         """Judge the rig by the light of several rounds and the lights that fire, (light,)."""
-        if not light:
+        if not seen:
             return None
         vectors = self.vectors[:, firing]
-        vectors = vectors if len(vectors) == 1 else np.concatenate([vectors] * len(light))
+        vectors = vectors if len(vectors) == 1 else np.concatenate([vectors] * len(seen))
         places = np.stack([self.cols, -self.rows], axis=1) / max(int(self.cols.max()), 1)
-        return rig_fit(np.concatenate(light)[:, firing], vectors, np.concatenate([places] * len(light)))
+        light, white = (
+            np.concatenate(parts)[:, firing]
+            for parts in ([one.light for one in seen], [np.broadcast_to(one.white, one.light.shape) for one in seen])
+        )
+        return rig_fit(light, vectors, np.concatenate([places] * len(seen)), white=white)
 
 
 def rig_points(plan: Plan, rig: Rig, *, height_px: int, width_px: int, channels: int) -> RigPoints:
