@@ -350,6 +350,32 @@ def test_a_wall_whose_normals_differ_by_noise_alone_says_nothing_of_the_rig() ->
     assert slope_agreement(coarse_normals(gentle(1.5, curved=0.0))) is None
 
 
+def leaning(lean_deg: float, *, mirrored: bool, rim_noise: float = 0.0) -> Surface:
+    """Return a pipe that leans to the right by an angle, with noise that grows towards its rim."""
+    lean, rng = np.radians(lean_deg), np.random.default_rng(5)
+    row, col = np.mgrid[:120, :160].astype(np.float64)
+    across = ((col - 79.5) * np.cos(lean) - (59.5 - row) * np.sin(lean)) / 40
+    inside = np.abs(across) < 0.97
+    towards = np.sqrt(np.where(inside, 1 - across**2, 1))
+    normals = np.stack([across * np.cos(lean), -across * np.sin(lean), towards], axis=-1)
+    wide = np.stack([cv2.GaussianBlur(rng.normal(size=(120, 160)), (0, 0), 4.0) for _ in range(3)], axis=-1)
+    normals = normals + rim_noise * wide / towards[..., None] ** 2
+    normals *= np.array([-1 if mirrored else 1, 1, 1]) * inside[..., None]
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
+    return Surface(normals=normals.astype(np.float32), albedo=np.full((120, 160), 0.5, np.float32), valid=inside)
+
+
+def test_a_pipe_that_stands_upright_says_nothing_of_the_rig_and_one_that_leans_does() -> None:
+    assert slope_agreement(coarse_normals(leaning(0.0, mirrored=False, rim_noise=0.02))) is None
+    assert slope_agreement(coarse_normals(leaning(3.5, mirrored=True))) is None
+    told = slope_agreement(coarse_normals(leaning(5.0, mirrored=True)))
+    assert told is not None
+    assert told < -0.9
+    right = slope_agreement(coarse_normals(leaning(3.5, mirrored=False)))
+    assert right is not None
+    assert right > 0.9
+
+
 def test_paint_that_shows_through_a_dome_is_not_taken_for_noise() -> None:
     dome = gentle(0.3, curved=1.0)
     paint = np.random.default_rng(6).normal(size=(120, 160, 2)).astype(np.float32)
