@@ -36,7 +36,14 @@ from psvideo.sync.unbroken import unbroken
 from psvideo.sync.unfired import incomplete, only_fired, remarks_on_unfired, unfired_of
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
-from psvideo.sync.verdict.refusal import clock_too_far, in_step_with_frames, nothing_to_find, shows_the_same, why_not
+from psvideo.sync.verdict.refusal import (
+    clock_too_far,
+    in_step_with_frames,
+    nothing_to_find,
+    other_times_as_well,
+    shows_the_same,
+    why_not,
+)
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
 
 ADVICE = (
@@ -68,6 +75,7 @@ def timing_from_rows(
         return synced_timing(plan, indices, clip=clip, dropped=dropped, first_light=first_light)
     rows = _to_fit(plan, indices, profiles, doubt, clip=clip)
     verdict = believed_fit(plan, rows)
+    _refuse_where_others_fit(plan, verdict, clip)  # of their parts, shorter ones show even less
     take = _Take(
         plan=plan,
         clip=clip,
@@ -237,8 +245,14 @@ def _to_fit(
 
 
 def _refuse_unless_believed(plan: Plan, rows: Profiles, verdict: Verdict, clip: str) -> None:
+    _refuse_where_others_fit(plan, verdict, clip)
     if not verdict.believed:
         raise NoStrobeError(_not_found(plan, rows, verdict.found, clip))
+
+
+def _refuse_where_others_fit(plan: Plan, verdict: Verdict, clip: str) -> None:
+    if verdict.other is not None:
+        raise NoStrobeError(f"{clip}: {other_times_as_well(plan, verdict.found, verdict.other)}")
 
 
 def _strobe(plan: Plan, found: ClipFit, first_light: str | None) -> FoundStrobe:

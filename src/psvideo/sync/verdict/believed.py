@@ -3,12 +3,14 @@
 from dataclasses import dataclass, replace
 
 from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, gain_of
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.rowfit.standard_error import freedom
 from psvideo.sync.rowfit.tracking.course import too_many
+from psvideo.sync.verdict.elsewhere import fits_elsewhere
 from psvideo.sync.verdict.refusal import MOST_PPM, shows_the_same
 from psvideo.sync.verdict.rivals import (
     BETTER,
@@ -50,11 +52,12 @@ FLASHES_DIFFER = 0.7
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
     """A fit, the plan under which it was made (another camera than the given plan's where that was wrong by far), and
-    whether it is to be believed."""
+    whether it is to be believed. ``other``: flashes at other times that explain the clip as well."""
 
     plan: Plan
     found: ClipFit
     believed: bool
+    other: Beat | None = None
 
 
 def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
@@ -64,13 +67,18 @@ def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
     """
     found = find(plan, rows)
     if not doubtful(plan, found):
-        return Verdict(plan=plan, found=found, believed=True)
+        return _unless_elsewhere(Verdict(plan=plan, found=found, believed=True))
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found) and not _feigned(plan, found)
     if believed:
         rivals = _worth_trying(plan, meant, found)
         believed = not rivals or best_rival(meant, rows, rivals) is None
-    return Verdict(plan=meant, found=found, believed=believed)
+    return _unless_elsewhere(Verdict(plan=meant, found=found, believed=believed))
+
+
+def _unless_elsewhere(verdict: Verdict) -> Verdict:
+    other = fits_elsewhere(verdict.plan, verdict.found) if verdict.believed else None
+    return replace(verdict, believed=False, other=other) if other else verdict
 
 
 def _as_meant(plan: Plan, rows: Profiles, found: ClipFit) -> tuple[Plan, ClipFit]:
