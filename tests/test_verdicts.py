@@ -501,7 +501,7 @@ def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_no
     )
     (lacking,) = result.validity(one)
     assert "Move slower" in lacking.advice
-    (lacking,) = result.validity(one, curve_doubted=True)
+    (lacking,) = result.validity(one, first=result.first_of_all((), curve_doubted=True))
     assert lacking.advice == result.CURVE_FIRST
     said = list(judge_rig(one, curve_doubt="the files are tagged 'hlg'"))
     assert [(line.grade, line.found) for line in said] == [("doubtful", "The files are tagged 'hlg'.")]
@@ -1106,3 +1106,52 @@ def test_pipes_and_bottles_under_a_right_rig_are_not_doubted(shape: str, lights:
     """Upright, they change in one direction only: what was left across was held against the rig."""
     one = Footage(shape=shape, lights=lights, noise=noise, solved=True).observed(1)
     assert "doubtful" not in {line.grade for line in rig_of(one)}
+
+
+@pytest.mark.parametrize(("spoilt", "rounds", "grade"), [(1, 8, "nothing"), (2, 20, "nothing"), (3, 20, "bad")])
+def test_a_missing_frame_costs_its_rounds_and_not_the_take(spoilt: int, rounds: int, grade: str) -> None:
+    """One lost frame of 120 took 31 % of one round's rows of 28, and the take was "not usable"."""
+    timing = timing_of(dropped_frames=(DroppedFrames(after=50, count=1),))
+    facts = [facts_of(number=1001 + n, unseen_share=0.31 if n < spoilt else 0.0) for n in range(rounds)]
+    lines = list(of_rows.coverage(plan_of(("a",)), timing, Observed(lights=("a",), facts=KeptFacts(facts))))
+    assert graded(lines, "rows") == grade
+    assert graded(lines, "frames") == "doubtful"
+    assert not any("360" in line.advice for line in lines)
+
+
+@pytest.mark.parametrize("clip", [0.016, 0.2])
+def test_a_clipped_take_is_not_told_to_give_more_light(clip: float) -> None:
+    one = Footage(lights=3, clip=clip, clipping=3, noise=0, solved=True, dark=0.7).observed(0)
+    lines = judgements(plan_of(one.lights), timing_of(), one)
+    (lacking,) = (line for line in lines if line.subject == "validity")
+    assert lacking.grade != "good"
+    assert ("more light," in lacking.advice) == (clip < 0.02)
+    assert (lacking.advice == result.CLIPPING_FIRST) == (clip > 0.02)
+
+
+@pytest.mark.parametrize(("gain", "doubted"), [(1.0, False), (2.0, True)])
+def test_under_a_doubted_rig_more_light_is_not_what_lacks(gain: float, doubted: bool) -> None:
+    one = Footage(shape="waves", lights=4, claimed_gain=gain, solved=True).observed(0)
+    one.facts = KeptFacts(replace(facts, valid_share=0.1, measured_share=1.0) for facts in one.facts)
+    lines = judgements(plan_of(one.lights), timing_of(), one)
+    assert (graded(lines, "rig") != "good") == doubted
+    assert (next(line.advice for line in lines if line.subject == "validity") == result.RIG_FIRST) == doubted
+
+
+@pytest.mark.parametrize(("clipping", "words"), [(5, "all powers to"), (1, "its power"), (9, "their powers")])
+def test_powers_to_lower_are_said_as_a_share_of_what_they_are(clipping: int, words: str) -> None:
+    """Lamps at 40 % that clipped by far were told "lower all powers to 50 %", which is more."""
+    lines = exposure(
+        Footage(lights=5 if clipping <= 5 else clipping + 1, clip=0.16, clipping=clipping, noise=0).observed(0)
+    )
+    (line,) = (one for one in lines if one.subject == "clipping")
+    assert words in line.advice
+    assert re.search(r"\d %( of the| of) what (it is|they are)", line.advice)
+
+
+@pytest.mark.parametrize(("planned", "said"), [(0.04, "to 0.4 % (now 4 %)"), (0.5, "to 5 % (now 50 %)")])
+def test_no_power_is_advised_as_nothing(planned: float, said: str) -> None:
+    one = Observed(lights=("a",), counts={"a": count_levels(np.full(100, 2, np.float32), 1.0)})
+    plan = plan_of(("a",))
+    flashes = tuple(replace(flash, lights={"a": planned}) for flash in plan.flashes)
+    assert said in power_words(replace(plan, flashes=flashes), one)["a"]

@@ -10,7 +10,7 @@ from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
 from psvideo.report.judge.of_timing import timing_and_order
-from psvideo.report.judge.result import accuracy, distance, focus, steadiness, validity
+from psvideo.report.judge.result import accuracy, distance, first_of_all, focus, steadiness, validity
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
@@ -32,17 +32,21 @@ def judgements(
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
+    exposed = (
+        (saturation,) if saturation else tuple(exposure(observed, unused_stops=stops_unused(plan.camera.encoding)))
+    )
+    lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt))
     return (
         *on_time,
         *coverage(plan, timing, observed, take_s=take_s),
-        *([saturation] if saturation else exposure(observed, unused_stops=stops_unused(plan.camera.encoding))),
+        *exposed,
         *lamps(observed, timed=all(one.grade == "good" for one in on_time), missed=in_step(plan, timing)),
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),
-        *rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt),
+        *lit,
         *accuracy(observed),
         *distance(observed),
-        *validity(observed, curve_doubted=bool(curve_doubt)),
+        *validity(observed, first=first_of_all((*exposed, *lit), curve_doubted=bool(curve_doubt))),
         *steadiness(observed.facts),
     )

@@ -116,7 +116,7 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
             grade="bad" if max(shares) > lost else "doubtful",
             found=f"Every light clips: {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the subject.",
             advice=f"Close the aperture by about {_half(-np.log2(power))}, or lower all powers to "
-            f"{_percent(power)}, and look again.",
+            f"{_percent(power)} of what they are, and look again.",
         )
         return
     whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
@@ -127,7 +127,8 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
             found=f"{len(over)} of {len(levels)} lights clip: "
             f"{first_of({light: one.clipped_share for light, one in over.items()})} of the subject.",
             advice="Lower their powers (or durations) to about "
-            f"{_percent(min(one.right_power(whole) for one in over.values()))}, or close the aperture.",
+            f"{_percent(min(one.right_power(whole) for one in over.values()))} of what they are, or close the "
+            "aperture.",
         )
         return
     for light, one in over.items():
@@ -135,7 +136,7 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
             subject="clipping",
             grade="bad" if few and one.clipped_share > lost else "doubtful",
             found=f"The flash of {light!r} is clipped in {100 * one.clipped_share:.0f} % of the subject.",
-            advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))}.",
+            advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))} of what it is.",
         )
 
 

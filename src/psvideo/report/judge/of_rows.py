@@ -15,6 +15,8 @@ MIXED, LOST_MIXED = 0.02, 0.2
 """Shares of rows that hold two flashes, from which a take is doubtful, and bad."""
 MOST_UNSEEN, LOST_UNSEEN = 0.02, 0.3
 """Shares of a round's rows that no frame saw, from which a take is doubtful, and bad."""
+SPOILT = 0.1
+"""Where frames are missing, this share of the rounds may lose rows for it, and one of several: the others serve."""
 BLIND = 0.97
 """A camera whose exposure is a smaller share of its frame misses flashes while the shutter is closed."""
 NAMED = 3
@@ -35,7 +37,9 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
         unseen = 0.0  # more frames show the ambient light of more rows
     said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
     holes = list(_dropped(timing, observed, alone=not (without_dark or _is_blind(timing))))
-    explained = bool(said) or (bool(timing.dropped_frames) and unseen <= LOST_UNSEEN)
+    lost = sum(one.unseen_share > MOST_UNSEEN for one in observed.facts)
+    by_holes = bool(timing.dropped_frames) and (unseen <= LOST_UNSEEN or _few(lost, len(observed.facts)))
+    explained = bool(said) or by_holes  # else it takes a line of its own
     if unseen > MOST_UNSEEN and not explained and without_dark:
         said.append(
             Judgement(
@@ -52,7 +56,9 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
                 subject="rows",
                 grade="bad" if unseen > LOST_UNSEEN else "doubtful",
                 found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame.",
-                advice="Use all frames (no steps in `frames`), and shoot at 360 degrees.",
+                advice="See the line on missing frames first."
+                if timing.dropped_frames
+                else "Use all frames (no steps in `frames`), and shoot at 360 degrees.",
             )
         )
     yield from said
@@ -62,6 +68,11 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
             "Every row of every round was seen" if not unseen else f"All but {100 * unseen:.2g} % of the rows were seen"
         )
         yield Judgement(subject="rows", grade="good", found=f"{seen}; no frame is missing.")
+
+
+def _few(spoilt: int, rounds: int) -> bool:
+    """Return whether so few rounds are spoilt that the others serve."""
+    return spoilt <= max(SPOILT * rounds, 1) and spoilt < rounds
 
 
 def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
@@ -132,7 +143,7 @@ def _dropped(timing: Timing, observed: Observed, *, alone: bool) -> Iterator[Jud
     spoilt = [one.number for one in observed.facts if one.unseen_share > 0]
     if missing:
         where = listed([f"{hole.count} after number {hole.after}" for hole in holes], NAMED, things="places")
-        grave = alone and len(spoilt) > 0.1 * max(len(observed.facts), 1) and len(spoilt) > 1
+        grave = alone and len(spoilt) > 1 and not _few(len(spoilt), len(observed.facts))
         yield Judgement(
             subject="frames",
             grade="doubtful",

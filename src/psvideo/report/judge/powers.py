@@ -26,8 +26,17 @@ def _words(planned: float, levels: Levels, whole: list[Levels]) -> str:
     if factor > 1 / FAINTEST:
         return "gives hardly any light: does it fire?"
     if 1 / RIGHT <= factor <= RIGHT:
-        return f"power {100 * planned:.0f} % is right"
+        return f"power {_percent(planned)} is right"
     if wanted <= 1:
-        return f"set its power to {100 * wanted:.0f} % (now {100 * planned:.0f} %)"
+        return f"set its power to {_percent(wanted)} (now {_percent(planned)})"
     more = f"bring it nearer or open the aperture by {np.log2(wanted):.1f} stops"
-    return more if planned == 1 else f"set its power to 100 % (now {100 * planned:.0f} %), and {more}"
+    return more if planned == 1 else f"set its power to 100 % (now {_percent(planned)}), and {more}"
+
+
+def _percent(power: float) -> str:
+    """Return a power in per cent, never rounded to nothing.
+
+    >>> _percent(0.62), _percent(0.096), _percent(0.004)
+    ('62 %', '9.6 %', '0.4 %')
+    """
+    return f"{100 * power:.0f} %" if power >= 0.1 else f"{100 * power:.2g} %"

@@ -40,6 +40,11 @@ MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
 NOISY_DEG, LOST_NOISY_DEG = 4.0, 10.0
+CLIPPING_FIRST = (
+    "See the line on clipping first: what clips is no measurement, and more light clips more. Beyond that, place the "
+    "lights nearer to the camera's axis, or use more of them, so that three reach every part."
+)
+RIG_FIRST = "See the line on the rig first: under wrong lights no normal is to be trusted, however much light there is."
 CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
 
 
@@ -61,9 +66,20 @@ def focus(observed: Observed) -> Judgement:
     )
 
 
-def validity(observed: Observed, *, curve_doubted: bool = False) -> Iterator[Judgement]:
-    """Judge how much of the subject has a normal to be trusted, and what the rest lacks; ``curve_doubted``: the files
-    are likely read by another curve than their own."""
+def first_of_all(lines: Sequence[Judgement], *, curve_doubted: bool = False) -> str:
+    """Return which of the lines said so far to mend before validity is looked at, empty where none; ``curve_doubted``:
+    the files are likely read by another curve than their own."""
+    doubted = {one.subject for one in lines if one.grade in ("doubtful", "bad")}
+    if curve_doubted:
+        return CURVE_FIRST
+    if "clipping" in doubted:
+        return CLIPPING_FIRST
+    return RIG_FIRST if "rig" in doubted else ""
+
+
+def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
+    """Judge how much of the subject has a normal to be trusted, and what the rest lacks; ``first`` is what to do before
+    anything else, as ``first_of_all`` says it."""
     known = [one for one in observed.facts if one.valid_share is not None]
     if not known:
         return
@@ -89,14 +105,15 @@ def validity(observed: Observed, *, curve_doubted: bool = False) -> Iterator[Jud
             found=f"Three lights reach {100 * np.median(reached):.0f} % of the subject, and {found}: elsewhere its "
             "predicted error is too large."
             + (" These normals serve a look, and no measurement." if usual < NONE_VALID else ""),
-            advice=CURVE_FIRST if curve_doubted else _trusting(observed),
+            advice=first or _trusting(observed),
         )
         return
     yield Judgement(
         subject="validity",
         grade=grade,
         found=f"Only {found}.",
-        advice="Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
+        advice=first
+        or "Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
         "that three reach every part.",
     )
 
