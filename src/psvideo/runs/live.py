@@ -8,12 +8,10 @@ from pathlib import Path
 
 from psvideo.errors import NoStrobeError, said_of
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.rig_toml import SCHEMA as RIG
-from psvideo.formats.rig_toml import format_rig, read_rig
+from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
-from psvideo.formats.whole_files import check_can_be_written, check_ending, refuse_existing, write_text
-from psvideo.live.ball_lights import BallLights
+from psvideo.formats.whole_files import check_can_be_written, refuse_existing, write_text
 from psvideo.live.chain import Chain
 from psvideo.live.followed_timing import followed_timing
 from psvideo.live.following.lock import check_followed
@@ -21,25 +19,19 @@ from psvideo.live.incoming.recording import FIRST_NUMBER, recorded_words, record
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.incoming.sources import opened_source
 from psvideo.live.running import Running
-from psvideo.live.showing.newest_pictures import NewestPictures
 from psvideo.live.showing.newest_result import NewestRound
-from psvideo.live.showing.page_server import live_page
 from psvideo.live.showing.quality import first_quality
-from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveStatus, LiveSummary
-from psvideo.live.watching import Watching, told
 from psvideo.model.choices import Pace
 from psvideo.model.first_light import check_first_light
-from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.rig import Rig
-from psvideo.model.timing import timed_camera
+from psvideo.model.timing import Timing
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.on_set.live_rehearsal import rehearse
 from psvideo.runs.on_set.live_strobe import held_strobe
+from psvideo.runs.on_set.live_viewed import PageAddress, check_gives_normals, rig_keeper, viewed
 from psvideo.runs.steps.caller import PYTHON, Caller
-from psvideo.solve.near_surface import near_surface_of
-from psvideo.solve.normals.illumination import illumination
 from psvideo.strobe.link.ports import AUTO
 from psvideo.strobe.runlog import RunLog, format_log
 
@@ -112,10 +104,11 @@ def live(
         check_can_be_written(timing_path)
     if known is not None:
         with said_of(rig):
-            _check_rig(known, played)
+            check_gives_normals(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
     running.prepare = lambda: rehearse(played, known, step=running.chain.step, page=page)
-    keep = _keeper(path_if_given("rig_out", rig_out), force=force)
+    kept = rig_keeper(path_if_given("rig_out", rig_out), force=force)
+    address = PageAddress(host=host, port=port, token=token)
     record_path = path_if_given("record", record)
     plan_path = path_if_given("plan", plan) or played.plan_path
 
@@ -128,7 +121,7 @@ def live(
     )
     with (
         _said_what_is_recorded(running, record_path, caller),
-        _page(running, played, known, caller, opened, keep, host, port, token) if page else nullcontext(),
+        viewed(running, known, address, kept=kept, opened=opened, caller=caller) if page else nullcontext(),
         nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
         nullcontext() if lock is None else held(plan_path, lock=lock) as holding,
     ):
@@ -137,17 +130,29 @@ def live(
         summary = running.run()
     if recorded is not None:
         summary = replace(summary, recorded=recorded.written, notes=running.all_notes)
-    if running.chain.follower is None:
-        few = f"{played.name}: {summary.frames} frames are too few to find the strobe in. Let it run for longer."
-        whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
-        raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
+    _check_found(running, record_path)
     if timing_path is not None:
-        named = running.chain.count.first_file
-        name, first = played.name, played.first_number if named is None else named
-        if record_path is not None:
-            name, first = record_path.resolve().name, FIRST_NUMBER
-        write_text(timing_path, format_timing(followed_timing(running.chain, clip=name, first_number=first)))
+        write_text(timing_path, format_timing(_timing(running, record_path)))
     return summary
+
+
+def _check_found(running: Running, record_path: Path | None) -> None:
+    """Raise NoStrobeError where no strobe was found, with what was recorded all the same."""
+    if running.chain.follower is not None:
+        return
+    frames, recorded = running.chain.count.seen, running.recording
+    few = f"{running.source.name}: {frames} frames are too few to find the strobe in. Let it run for longer."
+    whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
+    raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
+
+
+def _timing(running: Running, record_path: Path | None) -> Timing:
+    """Return the timing of all that was followed, by the recording's name and numbers where one was made."""
+    source, named = running.source, running.chain.count.first_file
+    name, first = source.name, source.first_number if named is None else named
+    if record_path is not None:
+        name, first = record_path.resolve().name, FIRST_NUMBER
+    return followed_timing(running.chain, clip=name, first_number=first)
 
 
 @contextmanager
@@ -160,75 +165,6 @@ def _said_what_is_recorded(running: Running, path: Path | None, caller: Caller) 
         if path is not None and record is not None and record.written:
             caller.warn(f"{recorded_words(path, record)} {record.ended}".rstrip())
         raise
-
-
-def _check_rig(rig: Rig, source: LiveSource) -> None:
-    """Raise PsvideoError where a rig gives no normals: before a board flashes, not when the first round is solved."""
-    lights, camera = lights_as_planned(rig, source.plan), source.plan.camera
-    near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
-    channels = source.channels or max(len(light.by_channel) for light in lights)
-    illumination(lights, channels=channels, ground=None if near is None else near.ground)
-
-
-def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:
-    """Return what writes a rig that was found live, and says what became of it."""
-    if path is None:
-        return lambda rig: "Lights found, and used from now on. With `rig_out` they are written, too."
-    check_ending(path, ".toml", name="rig_out")
-    refuse_existing(path, force=force, mark=RIG)
-
-    def write(rig: Rig) -> str:
-        write_text(path, format_rig(rig))
-        return f"Lights found, used from now on, and written to {path}."
-
-    return write
-
-
-@contextmanager
-def _page(
-    running: Running,
-    source: LiveSource,
-    rig: Rig | None,
-    caller: Caller,
-    opened: Callable[[str], None],
-    kept: Callable[[Rig], str],
-    host: str,
-    port: int | None,
-    token: str | None,
-) -> Iterator[None]:
-    """Serve the live page while the block runs: every result is put there, and some are judged."""
-    plan = source.plan
-    watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell), NewestPictures()
-    shown = running.shown
-
-    def use(found: Rig) -> str:
-        _check_rig(found, source)
-        running.chain.rig = watching.rig = found
-        return kept(found)
-
-    ball = BallLights(rig=rig, found=use)
-
-    def show(newest: NewestRound) -> None:
-        small = smaller_plan(plan, newest.step)
-        pictures.put(newest, timed_camera(small, newest.timing))
-        ball.look(newest)
-        shown(newest)
-
-    def judge(newest: NewestRound, until_s: float) -> None:
-        watching.look(newest, smaller_plan(plan, newest.step), until_s=until_s)
-
-    running.meanwhile = judge
-    running.shown, running.drawn_ages_s = show, pictures.drawn_ages_s
-
-    def say() -> dict[str, object]:
-        return told(running.status, watching) | {"ball": [caller.spell(words) for words in ball.words]}
-
-    server = live_page(pictures, say, host=host, port=port, token=token, ball=ball.ask)
-    try:
-        opened(server.url)
-        yield
-    finally:
-        server.close()
 
 
 def _running(
