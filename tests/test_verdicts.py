@@ -1155,3 +1155,22 @@ def test_no_power_is_advised_as_nothing(planned: float, said: str) -> None:
     plan = plan_of(("a",))
     flashes = tuple(replace(flash, lights={"a": planned}) for flash in plan.flashes)
     assert said in power_words(replace(plan, flashes=flashes), one)["a"]
+
+
+@pytest.mark.parametrize(("gain", "weak"), [(0.15, False), (0.1, True)])
+def test_where_a_light_is_known_to_be_weaker_than_the_rig_says_no_turned_rig_is_named(gain: float, weak: bool) -> None:
+    one = Footage(lights=3, gains=[1.0, gain, 1.0], solved=True).observed(0)
+    one.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(0.0, 20.0, 0.0), rest_deg=0.2)]
+    one.slopes[:] = [0.9]
+    said = " ".join(line.found for line in rig_of(one))
+    one.slopes[:] = [0.2]
+    assert any("mirrored" in line.found for line in rig_of(one)) is not weak
+    assert ("swung to the left or right" in said) is not weak
+    assert ("'light1'" in said) is weak
+
+
+def test_under_three_lights_strengths_may_be_why_normals_lean() -> None:
+    one = Footage(lights=3, claimed_gain=2.0, solved=True).observed(0)
+    (line,) = rig_of(one)
+    assert line.grade != "good"
+    assert "directions or strengths" in line.found or "other strengths" in line.found

@@ -27,7 +27,7 @@ NAMED = 4
 def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> Iterator[Judgement]:
     """Judge whether every lamp gives light, always, and steadily; where flash times are not known (``timed``), only
     whether it does at all. ``missed``: the camera may be blind whenever one lamp flashes."""
-    facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
+    facts = _known(observed)
     if not facts:
         return
     level = _levels(facts)
@@ -46,6 +46,24 @@ def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> It
     if not said and relative.max() > 0:  # else nothing is lit, which is said once
         always = " in every round" if timed and whole.all() else ""
         yield Judgement(subject="lights", grade="good", found=_all_fire(relative[known], len(known), always))
+
+
+def weaker_than_rig(observed: Observed) -> tuple[str, ...]:
+    """Return the lights of which so few normals are solved that one of them gives little, where the rig says more:
+    it leans all of them."""
+    facts = _known(observed)
+    if not facts:
+        return ()
+    usual = np.median(_levels(facts), axis=0)
+    weaker = _weaker(usual / max(float(usual.max()), 1e-12), _brightest(observed), _claimed(observed))
+    return tuple(
+        light for light, so, seen in zip(observed.lights, weaker, _shown(observed), strict=True) if so and seen
+    )
+
+
+def _known(observed: Observed) -> list[InstantFacts]:
+    """Return the rounds in which every lamp's light is known."""
+    return [one for one in observed.facts if len(one.levels) == len(observed.lights)]
 
 
 def _all_fire(relative: NDArray[np.float64], lights: int, always: str) -> str:
@@ -92,6 +110,14 @@ def _shown(observed: Observed) -> NDArray[np.bool_]:
     return counted | (not counted.any())
 
 
+def _weaker(
+    relative: NDArray[np.float64], brightest: NDArray[np.float64], claimed: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return which lamps give light and little of it, (light,), where the rig says that they give more."""
+    dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
+    return np.asarray(dim & (relative >= NOT_FIRING) & (claimed >= WEAK_LIGHT))
+
+
 def _weak(
     lights: Sequence[str],
     relative: NDArray[np.float64],
@@ -117,8 +143,9 @@ def _weak(
     dead = [(light, share) for light, share in zip(lights, relative, strict=True) if share < NOT_FIRING]
     if dead:
         yield _no_light(dead, others=others, missed=missed)
-    for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
-        if is_dim and share >= NOT_FIRING and says >= WEAK_LIGHT:
+    weaker = _weaker(relative, brightest, claimed)
+    for light, share, is_dim, is_weaker, says in zip(lights, relative, dim, weaker, claimed, strict=True):
+        if is_weaker:
             yield _weaker_than_rig(light, share, says, lights=len(lights))
         elif is_dim and share >= NOT_FIRING and len(weak) <= NAMED:
             yield Judgement(

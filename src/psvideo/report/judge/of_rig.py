@@ -1,7 +1,9 @@
 """Judgements on the rig: whether its directions and strengths can have made the plates."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from psvideo.model.units import listed
+from psvideo.report.judge.of_lamps import NAMED, weaker_than_rig
 from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.rig_by_normals import facing_away, lights_crossed, normals_lean, surface_shines
 from psvideo.report.judge.rig_by_plates import (
@@ -28,8 +30,9 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     said = Judgement(subject="rig", grade="doubtful", found=_sentence(curve_doubt)) if curve_doubt else None
     curve = said or (None if fit is None else other_curve(fit))
     wrong = None if fit is None or curve else rig_misfits(firing, fit)
-    crossed, away = lights_crossed(observed, guessed=guessed), facing_away(observed)
-    leaning = None if curve or wrong or crossed or away else normals_lean(observed)
+    weaker = weaker_than_rig(observed)  # which leans normals, too, so that they are no surface's
+    crossed, away = None if weaker else lights_crossed(observed, guessed=guessed), facing_away(observed)
+    leaning = None if curve or wrong or crossed or away or weaker else normals_lean(observed)
     by_strength = fit is not None and bool(other_strengths(firing, fit))
     shines = wrong is not None and not (crossed or away or by_strength) and surface_shines(observed)
     near = None if fit is None or curve or shines else lights_near(fit)
@@ -48,7 +51,9 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     yield from doubted
     if any(one.subject == "rig" for one in doubted):
         return
-    if fit is not None:
+    if weaker:
+        yield _beside_weaker(weaker)
+    elif fit is not None:
         yield rig_explains(fit)
     elif observed.slopes:
         yield Judgement(
@@ -56,6 +61,17 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
             grade="good",
             found="The normals fit together as one surface's; three lights show no more of the rig.",
         )
+
+
+def _beside_weaker(weaker: Sequence[str]) -> Judgement:
+    """Say that lights that give less than the rig says hide whether its directions are right."""
+    named = listed([repr(light) for light in weaker], NAMED)
+    return Judgement(
+        subject="rig",
+        grade="unknown",
+        found=f"Whether the rig's directions are right is not known: {named} gives less than it says. See the line on "
+        "lights.",
+    )
 
 
 def _sentence(said: str) -> str:

@@ -39,6 +39,7 @@ FLAT = (
     "The normals are not quite those of one surface, and would be if all leaned otherwise: the lights lie nearly in a "
     "plane, so that gloss, light from around or a rig that is a little off turn all of them."
 )
+OR_STRENGTHS = " Under three lights other strengths than the rig's may do the same."
 TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
@@ -114,10 +115,10 @@ def normals_lean(observed: Observed) -> Judgement | None:
         return _off_axis(usual, usual.off_axis)
     whole = usual.rest_deg < REST * usual.lean_deg
     flat = _nearly_in_a_plane(observed)
-    exact = whole or int(observed.firing.sum()) == EXACT_LIGHTS
+    exact = int(observed.firing.sum()) == EXACT_LIGHTS
     return Judgement(
         subject="rig",
-        grade="bad" if exact and not flat and _lost(usual, shown_deg) else "doubtful",
+        grade="bad" if (whole or exact) and not flat and _lost(usual, shown_deg) else "doubtful",
         found=FLAT if flat else _leaning_words(usual, whole=whole, exact=exact),
         advice="Add lights from other sides, farther from the plane of these."
         if flat
@@ -162,10 +163,14 @@ def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
         axis, angle_deg = int(np.abs(usual.turn_deg).argmax()), float(np.linalg.norm(usual.turn_deg))
         return (
             f"The rig seems {TURNED[axis]} as a whole by about {angle_deg:.0f} degrees: {as_they_are} turned back by "
-            "that angle they would be."
+            f"that angle they would be.{OR_STRENGTHS if exact else ''}"
         )
-    by = f" by about {usual.lean_deg:.0f} degrees" if exact else ""
-    return f"The rig's directions are off: {as_they_are} tilted otherwise{by} they would be."
+    if exact:
+        return (
+            f"The rig's directions or strengths are off: {as_they_are} tilted otherwise by about "
+            f"{usual.lean_deg:.0f} degrees they would be."
+        )
+    return f"The rig's directions are off: {as_they_are} tilted otherwise they would be."
 
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:
