@@ -69,8 +69,8 @@ def _beside_weaker(weaker: Sequence[str]) -> Judgement:
     return Judgement(
         subject="rig",
         grade="unknown",
-        found=f"Whether the rig's directions are right is not known: {named} gives less than it says. See the line on "
-        "lights.",
+        found=f"Whether the rig's directions are right is not known: less light than it says comes from {named}. See "
+        "the line on lights.",
     )
 
 
