@@ -23,10 +23,11 @@ from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.inspect.about_clip import level
+from psvideo.inspect.about_plan import length_finding
 from psvideo.inspect.describe import describe
 from psvideo.inspect.findings import Description
-from psvideo.model.camera import Encoding
-from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.camera import Camera, Encoding
+from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import DroppedFrames, Flash, Timing
 
@@ -376,7 +377,7 @@ def test_photographs_with_a_plan_of_their_own_fit(shared_data: Path, tmp_path: P
     still = dataclasses.replace(plan, mode="synced", flashes=lights, camera=camera)
     found = describe(shared_data / "uw_psm" / "cat", plan=put_plan(tmp_path, still))
     assert found.fits
-    assert "12 frames, 12 flashes a round: 1 round" in lines(found, "ok")
+    assert "12 frames, 12 flashes a round: 1 whole round" in lines(found, "ok")
     assert "cat.mask.png" in lines(found, "ok")
 
 
@@ -391,3 +392,15 @@ def test_a_picture_is_described_and_a_broken_one_is_a_fault(tmp_path: Path) -> N
     broken = describe(path)
     assert [finding.level for finding in broken.findings] == ["FAULT"]
     assert "still.png" in broken.findings[0].text
+
+
+@pytest.mark.parametrize(
+    ("missing", "rounds"), [((), "4 whole rounds"), ((5,), "3 whole rounds"), ((5, 8), "2 whole rounds")]
+)
+def test_rounds_that_miss_a_frame_are_not_counted_as_whole(missing: tuple[int, ...], rounds: str) -> None:
+    """Ten frames of three flashes a round are three rounds only where all that lacks is in one of them."""
+    camera = Camera(width_px=16, height_px=12, fps=Fraction(60), exposure_s=1 / 60, readout_s=0.0)
+    flashes = [PlannedFlash(lights={name: 1.0}, duration_s=0.001) for name in "abc"]
+    plan = assemble_plan(camera=camera, flashes=flashes, dark_s=None, mode="synced")
+    found = length_finding(plan, tuple(number for number in range(1, 13) if number not in missing))
+    assert rounds in found.text

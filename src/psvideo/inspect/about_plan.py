@@ -1,6 +1,7 @@
 """What can be said of a plan alone: its lights, its marker, its dark time, what a clip of some length holds of it."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from psvideo.clip.transfer import find_curve
@@ -39,7 +40,7 @@ def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:
     """Say what frames of these numbers hold: flashes and whole rounds."""
     span = numbers[-1] - numbers[0] + 1
     if plan.mode == "synced":
-        return _synced_length(len(plan.flashes), len(numbers), span)
+        return _synced_length(len(plan.flashes), numbers)
     seconds = span * plan.camera.frame_period_s
     per_cycle = len(plan.cycle_slots)
     flashes = int(seconds / plan.cycle_s * per_cycle)
@@ -51,8 +52,11 @@ def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:
     return ok(text)
 
 
-def _synced_length(per_round: int, frames: int, span: int) -> Finding:
-    text = f"{frames} frames, {per_round} flashes a round: {counted(frames // per_round, 'round')}"
+def _synced_length(per_round: int, numbers: Sequence[int]) -> Finding:
+    frames, span = len(numbers), numbers[-1] - numbers[0] + 1
+    held = Counter((number - numbers[0]) // per_round for number in numbers)
+    whole = sum(count == per_round for count in held.values())
+    text = f"{frames} frames, {per_round} flashes a round: {counted(whole, 'whole round')}"
     if frames < per_round:
         return fault(f"{text}; a synced clip has one frame per flash, so {per_round - frames} are missing")
     if frames % per_round and frames == span:
