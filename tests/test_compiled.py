@@ -246,7 +246,7 @@ for module in pkgutil.walk_packages(psvideo.__path__, "psvideo."):
 from psvideo.cli.app import main
 from psvideo.sync.rowfit import kernel, row_model
 assert type(row_model.width._cache._impl.locator).__name__ == "_ReadOnly", "nothing is kept"
-matrix = np.array([[4.0, 2.0], [2.0, 5.0]])
+matrix = np.array([[5.0, 2.0], [2.0, 4.0]])
 kernel.factor(matrix, 2)
 assert np.allclose(np.tril(matrix), [[2.0, 0.0], [1.0, 2.0]]), matrix
 if sys.argv[1:]:
