@@ -179,6 +179,15 @@ def test_where_a_strobe_began_or_stopped_no_flash_beyond_is_complete(
     assert sum(flash.complete for flash in lit) >= len(lit) - len(dark) - 2
 
 
+def test_the_first_light_is_that_of_the_first_flash_that_fired(make_plan: PlanMaker) -> None:
+    """One that never fired counted as the clip's first complete one, and all lights had wrong names."""
+    plan = make_plan(height_px=48, width_px=12, dark=False)
+    shot = shot_of(plan, lambda flash: 2.0 < flash.start_s / plan.camera.frame_period_s < 3.1)
+    profiles = shot.frames[:60].mean(axis=2, dtype=np.float64)
+    timing = timing_from_rows(plan, np.arange(60), profiles, first_light="left")
+    assert next(flash for flash in timing.flashes if flash.complete).lit == ("left",)
+
+
 def test_light_goes_on_where_it_does_on_either_side_or_among_most_of_the_nearest() -> None:
     dark, unknown = -1e-3, np.nan
     three = around(np.array([1.0, 1.0, dark, dark, dark, 1.0, 1.0]), 3)

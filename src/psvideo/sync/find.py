@@ -19,10 +19,10 @@ from psvideo.model.first_light import TOGETHER, check_first_light, first_lit, is
 from psvideo.model.plan import HasLights, Plan
 from psvideo.model.timing import DroppedFrames, Order, Timing
 from psvideo.model.units import counted
-from psvideo.sync.beside_breaks import doubted_places
-from psvideo.sync.black_frames import black_frames, marked, remarks_on_black
+from psvideo.sync.black_frames import remarks_on_black
 from psvideo.sync.flashes_seen import flashes_of_fit, synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
+from psvideo.sync.marks import marks_of
 from psvideo.sync.restarted import found_apart, found_beside_dark, found_in_parts, found_within
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
@@ -33,7 +33,7 @@ from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.silent import silent
 from psvideo.sync.turns import turns
 from psvideo.sync.unbroken import unbroken
-from psvideo.sync.unfired import incomplete, only_fired, remarks_on_unfired, unfired_of
+from psvideo.sync.unfired import only_fired, remarks_on_unfired
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import (
@@ -85,11 +85,11 @@ def timing_from_rows(
     )
     parts = _parts(plan, rows, verdict)
     if parts:
-        strobes = _named_strobes(plan, parts, first_light)
+        strobes = _named_strobes(take, parts, first_light)
         chapters = [_chapter(take, cut, one) for (cut, _), one in zip(parts, strobes, strict=True)]
         return joined(chapters, take.dropped, take.outside([cut for cut, _ in parts]))
     _refuse_unless_believed(plan, rows, verdict, clip)
-    return _timing(take, _strobe(plan, verdict.found, first_light))
+    return _timing(take, _strobe(plan, verdict.found, first_light, take.indices))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +107,10 @@ class _Take:
         numbers = self.numbers[frames]
         dropped = tuple(hole for hole in self.dropped if numbers[0] <= hole.after < numbers[-1])
         return replace(self, indices=self.indices[frames], numbers=numbers, dropped=dropped)
+
+    def breaks(self, frames: slice) -> tuple[bool, bool]:
+        """Return whether some consecutive frames begin, and whether they end, elsewhere than the take."""
+        return frames.start > 0, frames.stop < len(self.numbers)
 
     def outside(self, parts: Sequence[slice]) -> list[tuple[int, int]]:
         """Return the first and last numbers of the stretches of frames that lie in none of some parts, in order."""
@@ -152,18 +156,21 @@ def _parts(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, Cl
     return [] if believed and unbroken(plan, whole, parts) else parts
 
 
-def _named_strobes(plan: Plan, parts: Sequence[tuple[slice, ClipFit]], first_light: str | None) -> list["FoundStrobe"]:
+def _named_strobes(take: _Take, parts: Sequence[tuple[slice, ClipFit]], first_light: str | None) -> list["FoundStrobe"]:
     """Return the strobes of a clip's parts, the same light under the same name in all of them.
 
     ``first_light`` is the first part's, wherever that begins: the clip's first complete flash lies in it.
     """
-    strobes = [_strobe(plan, found, None if n else first_light) for n, (_, found) in enumerate(parts)]
-    named = named_alike(plan, [(one.found, one.order) for one in strobes])
+    strobes = [
+        _strobe(take.plan, found, None if n else first_light, take.only(cut).indices, take.breaks(cut))
+        for n, (cut, found) in enumerate(parts)
+    ]
+    named = named_alike(take.plan, [(one.found, one.order) for one in strobes])
     return [FoundStrobe(found=found, order=order) for found, order in named]
 
 
 def _chapter(take: _Take, cut: slice, strobe: "FoundStrobe") -> Chapter:
-    part, breaks = take.only(cut), (cut.start > 0, cut.stop < len(take.numbers))
+    part, breaks = take.only(cut), take.breaks(cut)
     return Chapter(
         first=int(part.numbers[0]),
         last=int(part.numbers[-1]),
@@ -183,12 +190,8 @@ def _timing(take: _Take, strobe: "FoundStrobe", *, breaks: tuple[bool, bool] = (
         dropped=_all_dropped(take.dropped, take.numbers, take.indices, found.track.index),
         repeated=tuple(int(number) for number in take.numbers[found.track.repeated]),
     )
-    black = black_frames(plan, found)
-    spoilt = np.union1d(black, doubted_places(found, take.indices))
-    seen = marked(plan, found, timing.flashes, spoilt)
-    unfired = unfired_of(plan, found, seen, breaks=breaks)
-    seen = incomplete(seen, unfired.beside)
-    fired = incomplete(seen, unfired.never)
+    marks = marks_of(plan, found, timing.flashes, take.indices, breaks)
+    black, seen, unfired, fired = marks.black, marks.seen, marks.unfired, marks.fired
     notes = (
         *remarks(plan, found, steady=only_fired(found, seen, unfired)),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
@@ -226,7 +229,7 @@ def find_strobe(
     rows = rows if most_rows is None else rows.binned(most_rows)
     verdict = believed_fit(plan, rows)
     _refuse_unless_believed(plan, rows, verdict, clip)
-    return _strobe(plan, verdict.found, first_light)
+    return _strobe(plan, verdict.found, first_light, indices)
 
 
 def _to_fit(
@@ -255,8 +258,14 @@ def _refuse_where_others_fit(plan: Plan, verdict: Verdict, clip: str) -> None:
         raise NoStrobeError(f"{clip}: {other_times_as_well(plan, verdict.found, verdict.other)}")
 
 
-def _strobe(plan: Plan, found: ClipFit, first_light: str | None) -> FoundStrobe:
-    beat, order = _order_of_lights(plan, found, first_light)
+def _strobe(
+    plan: Plan,
+    found: ClipFit,
+    first_light: str | None,
+    indices: NDArray[np.int64],
+    breaks: tuple[bool, bool] = (False, False),
+) -> FoundStrobe:
+    beat, order = _order_of_lights(plan, found, first_light, indices, breaks)
     return FoundStrobe(found=replace(found, fit=replace(found.fit, beat=beat)), order=order)
 
 
@@ -289,22 +298,24 @@ def _as_profiles(
     return rows.windowed(window_frames(plan))
 
 
-def _order_of_lights(plan: Plan, found: ClipFit, first_light: str | None) -> tuple[Beat, Order]:
+def _order_of_lights(
+    plan: Plan, found: ClipFit, first_light: str | None, indices: NDArray[np.int64], breaks: tuple[bool, bool]
+) -> tuple[Beat, Order]:
     """Return the beat whose names are right, and how they are known."""
     if len(plan.cycle_slots) == 1:
         return found.fit.beat, "given"
     candidates = turns(plan, found.rows, found.fit.beat)
     if first_light is not None:
-        return _given_order(plan, found, candidates.beats, first_light), "given"
+        firsts = [_first_complete(plan, found, beat, indices, breaks) for beat in candidates.beats]
+        return _given_order(candidates.beats, firsts, first_light), "given"
     return candidates.beats[0], "marker" if candidates.sure else "guess"
 
 
-def _given_order(plan: Plan, found: ClipFit, alike: Sequence[Beat], first_light: str) -> Beat:
-    for beat in alike:
-        first = _first_complete(plan, found, beat)
+def _given_order(alike: Sequence[Beat], firsts: Sequence[HasLights | None], first_light: str) -> Beat:
+    for beat, first in zip(alike, firsts, strict=True):
         if first is not None and is_called(first, first_light):
             return beat
-    seen = _first_complete(plan, found, alike[0])
+    seen = firsts[0]
     raise PsvideoError(
         f"`first_light` {first_light} does not fit the footage: by the cycle's marker the clip's first complete flash "
         f"is {TOGETHER.join(seen.lit) if seen else 'none'}'s. Leave the option out, or check that plan.toml is the plan"
@@ -312,9 +323,13 @@ def _given_order(plan: Plan, found: ClipFit, alike: Sequence[Beat], first_light:
     )
 
 
-def _first_complete(plan: Plan, found: ClipFit, beat: Beat) -> HasLights | None:
+def _first_complete(
+    plan: Plan, found: ClipFit, beat: Beat, indices: NDArray[np.int64], breaks: tuple[bool, bool]
+) -> HasLights | None:
     """Return the first lit flash that the timing will call complete, if the beat's names are right."""
-    return first_lit(flash for flash in flashes_of_fit(plan, found, beat) if flash.complete)
+    named = replace(found, fit=replace(found.fit, beat=beat))
+    marks = marks_of(plan, named, flashes_of_fit(plan, found, beat), indices, breaks)
+    return first_lit(flash for flash in marks.fired if flash.complete)
 
 
 def _all_dropped(
