@@ -21,7 +21,8 @@ class Doubting:
     few_power: the more so the fewer lights there are: with this power of how much more of what is not matte they hide,
         because a normal and an albedo follow it.
     plain: so many times instead where m is of least squares, whose mean square for each measurement that is left free
-        is as large under few lights as under many (fitted with subjects left out 1.2 to 1.35, on others 0.9 to 1).
+        is as large under few lights as under many (fitted with subjects left out 1.2 to 1.35, on others 0.9 to 1; since
+        residuals of weak lamps count for what they are in normals, a little less holds as many).
     indirect: how much of the angle counts by which light from around would turn the normal.
     torn, torn_beside, torn_alone_deg: how much more it is for each degree by which normals belong to no surface; these
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
@@ -40,7 +41,7 @@ class Doubting:
     little_deg: float = 1.75
     own: float = 2.0
     few_power: float = 0.5
-    plain: float = 1.15
+    plain: float = 1.1
     indirect: float = 1.4
     torn: float = 2.5
     torn_beside: float = 0.5
