@@ -44,7 +44,7 @@ CLIPPING_FIRST = (
     "See the line on clipping first: what clips is no measurement, and more light clips more. Beyond that, place the "
     "lights nearer to the camera's axis, or use more of them, so that three reach every part."
 )
-RIG_FIRST = "See the line on the rig first: under wrong lights no normal is to be trusted, however much light there is."
+RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
 CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
 
 
