@@ -98,7 +98,7 @@ WRONG_PLACE = {
         "exists already and holds a plan.toml: it is footage, and not replaced",
     ),
     "a command misspelled": (["normal", "{clip}"], 2, "there is no command 'normal'; did you mean 'normals'?"),
-    "no rig": (["normals", "{clip}", "-o", "{tmp}/o"], 2, "the file that says where the lights are"),
+    "no rig": (["normals", "{tmp}/bare", "-o", "{tmp}/o"], 2, "the file that says where the lights are"),
     "the folder above": (["sync", "{day}"], 1, "A clip lies in it: name {clip}."),
     "the frames alone": (["sync", "{clip}/frames"], 1, "there is no plan.toml here, but one folder up"),
     "the plan for the clip": (["sync", "{clip}/plan.toml"], 1, "Name the folder that holds the frames, such as {clip}"),
@@ -134,6 +134,7 @@ def test_what_is_named_instead_of_what_was_meant_is_answered_by_what_to_name(
     (tmp_path / "plates" / "key").mkdir(parents=True)
     (tmp_path / "plates" / "timing.json").write_text("{}")
     words, status, expected = WRONG_PLACE[case]
+    shutil.copytree(clip, tmp_path / "bare", ignore=shutil.ignore_patterns("rig.toml"))
     places = {"clip": clip, "day": clip.parent, "tmp": tmp_path, "frame": next((clip / "frames").iterdir())}
     assert expected.format(**places) in said(*(word.format(**places) for word in words), status=status)
     assert not (tmp_path / "o").exists()

@@ -183,7 +183,7 @@ def test_what_may_cost_accuracy_is_a_warning(shot: Path, plan: Plan, name: str) 
 
 
 @pytest.mark.parametrize(
-    ("frames", "level", "message"), [(8, "ok", "2 rounds"), (9, "warn", "1 frame "), (3, "FAULT", "1 are")]
+    ("frames", "level", "message"), [(8, "ok", "2 whole rounds"), (9, "warn", "1 frame "), (3, "FAULT", "1 are")]
 )
 def test_a_synced_clip_has_one_frame_per_flash(
     tmp_path: Path, plan: Plan, frames: int, level: str, message: str
