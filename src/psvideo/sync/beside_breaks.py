@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Integers
+from psvideo.sync.rowfit.coarse.retime import regular_step
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses
 
@@ -28,7 +29,8 @@ def doubted_places(found: ClipFit, numbered: NDArray[np.int64]) -> Integers:
     """
     places, dark = found.track.index, found.unlit
     lit = np.flatnonzero(~dark & ~found.track.repeated)
-    stray = places - numbered
+    retimed = regular_step(places, numbered) != 1  # then frames that are missing or repeated by rule are no breaks
+    stray = np.zeros_like(places) if retimed else places - numbered
     breaks = np.flatnonzero((np.diff(stray[lit]) != 0) | (np.diff(np.cumsum(dark)[lit]) > 0)) + 1
     near = np.zeros(len(lit), np.bool_)
     for at in (0, *breaks.tolist(), len(lit)):
