@@ -11,6 +11,7 @@ import psvideo as ps
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.light_sigmas import light_sigmas
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Usable
 
@@ -33,6 +34,20 @@ def shot(strengths: Array, normals: Array, *, noise: float = NOISE) -> tuple[NDA
     images = 0.5 * np.maximum(shade, 0) * strengths[:, None, None]
     images += np.random.default_rng(1).normal(0, noise, images.shape)
     return images.astype(np.float32), directions, shade
+
+
+@pytest.mark.parametrize(
+    ("noise", "share", "power"),
+    [((1e-4, 0.0), 0.0, 0.0), ((0.0, 1e-4), 0.0, 0.5), ((0.0, 0.0), 0.03, 1.0)],
+    ids=["noise in the dark", "photon noise", "what is not matte"],
+)
+def test_what_is_off_grows_with_a_lamp_as_its_cause_does(
+    noise: tuple[float, float], share: float, power: float
+) -> None:
+    strengths = np.array([1, 1, 0.25, 0.04])
+    lit = Illumination(directions=ring(4, 35), intensities=strengths[:, None])
+    found = light_sigmas(lit, noise, light=0.4, share=share)
+    np.testing.assert_allclose(found, (strengths / strengths.mean()) ** power, rtol=1e-12)
 
 
 @pytest.mark.parametrize("solver", ["robust", "least-squares"])
