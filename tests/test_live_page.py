@@ -86,7 +86,7 @@ def test_a_port_that_is_taken_is_named_with_the_systems_own_words_alone(served: 
     taken = int(served[0].url.rsplit(":", 1)[1].strip("/"))
     with pytest.raises(UsageError, match=rf"`port` {taken}: cannot be used on 127\.0\.0\.1 \(Address already in use\)"):
         live_page(NewestPictures(), dict, port=taken)
-    with pytest.raises(UsageError, match="ports are 0 to 65535"):
+    with pytest.raises(UsageError, match="ports run from 0 to 65535"):
         live_page(NewestPictures(), dict, port=99999)
 
 

@@ -84,12 +84,13 @@ DEPTHS = (8, 10, 12, 14)
 
 
 def level_warning(header: Header, encoding: Encoding) -> tuple[str, ...]:
-    """Say where the plan's white level is one of other files: all light would count as so much darker."""
+    """Say where the plan's white level was meant for other files: all light would count as so much darker."""
     if header.bits is None or encoding.white_level is None or encoding.white_level < 2**header.bits:
         return ()
     return (
         f"white_level is {encoding.white_level:g} in the plan, and the largest code of these {header.bits}-bit files "
-        f"is {2**header.bits - 1}: it is one of other files. Write the code at which these saturate, or leave it out",
+        f"is {2**header.bits - 1}: it was meant for other files. Write the code at which these saturate, or leave it "
+        "out",
     )
 
 

@@ -168,7 +168,7 @@ class Chain:
                 return
             follower = self._caught_up(found, profiles)
             if follower.state != "locked":
-                self._seeking.found_nothing("The strobe was found, and gone again before it could be followed.")
+                self._seeking.found_nothing("The strobe was found, but was gone again before it could be followed.")
                 return
             later = [one for one in self._seeking.latest if one.number > profiles[-1].number]
             self._begin(follower, later, from_number=profiles[0].number)

@@ -154,7 +154,7 @@ def _decoded(
     except (av.FFmpegError, OSError, UnicodeDecodeError) as fault:
         if not came:
             raise PsvideoError(f"{name}: cannot be read ({_why(fault)}). {_advice(source)}") from fault
-        noted(f"{name}: broke off ({_why(fault)}). What came until then was used.")
+        noted(f"{name}: broke off ({_why(fault)}). What came before that was used.")
 
 
 def _whole_frames(

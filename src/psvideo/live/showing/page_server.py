@@ -144,7 +144,7 @@ def live_page(
             "pip install 'psvideo[live]'), or use `no_page`."
         ) from None
     if port is not None and not 0 <= port <= LAST_PORT:
-        raise UsageError(f"`port` {port}: ports are 0 to {LAST_PORT}. Name another one, or leave `port` out.")
+        raise UsageError(f"`port` {port}: ports run from 0 to {LAST_PORT}. Name another one, or leave `port` out.")
     secret = "" if host in LOCAL and token is None else token or secrets.token_urlsafe(12)
     page = LivePage(pictures=pictures, told=told, host=host, token=secret, ball=ball, _files=_files())
     reason: str | None = None
