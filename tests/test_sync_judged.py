@@ -12,6 +12,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.normal_equations import solved
+from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -271,3 +272,12 @@ def test_under_a_global_shutter_errors_are_in_rows_of_height(make_plan: PlanMake
     assert timing.phase_error_s is not None
     assert timing.phase_error_rows == pytest.approx(timing.phase_error_s * ROWS / plan.camera.frame_period_s)
     assert 0 < timing.phase_error_rows < 0.05
+
+
+def test_a_clock_of_which_one_window_alone_shows_anything_is_solved_for() -> None:
+    """Before a global shutter in step with the strobe one window cut a flash, and a fit ended in a traceback."""
+    at_s = np.linspace(0.0, 1.0, 6)
+    stiff = np.diff(np.eye(6), 2, axis=0)
+    hessian = np.diag([2.5e12, 0.0, 0.0, 0.0, 0.0, 0.0])
+    known = known_of_bends(hessian, Knots(at_s=at_s, penalty=stiff.T @ stiff), 1e-7, 1.0)
+    assert np.isfinite(np.linalg.solve(hessian + known, np.ones(6))).all()

@@ -21,10 +21,12 @@ CLEARLY = 5.0
 """By how much the log-likelihood of a bent clock must exceed a straight one's."""
 WANDERING = np.geomspace(1e-18, 1e-6, 49)
 """Strengths of the rate's random walk that are tried, in s^2 per s^3."""
+HARDLY = 1e-12
+"""What no window shows is known as little as this share of what is known best: at all, so that equations are solved."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Knots:
+class Knots:
     """Knots and what is known of bends at them: ``penalty`` / strength is their precision."""
 
     at_s: Doubles
@@ -53,51 +55,47 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
     if len(rows.window_start) < LEAST_WINDOWS:
         return fit
     knots = _knots(rows)
+    beat, rest, weight = fit.beat, fit.rest, fit.weight
+    strength = 0.0
     basis = _basis(len(knots.at_s), free)
-    was_bent = bool(fit.beat.clock.knot_s)
-    beat, rest = fit.beat, fit.rest
     for step in range(steps):
-        scale = errors_of_residuals(rows, rest, 0.02 if step == 0 and was_bent else 0.0)
+        scale = errors_of_residuals(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
         rest, hessian, scores, _ = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
         inflation = _inflation(hessian, scores, rows)
-        pull = scores.sum(axis=0)
-        strength, gain = _wandering(hessian / inflation, pull / inflation, beat, knots)
-        if gain < CLEARLY and not was_bent:
+        strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
+        if gain < CLEARLY and not fit.beat.clock.knot_s:
             return fit
-        known = _known(hessian, knots, strength, inflation)
+        known = known_of_bends(hessian, knots, strength, inflation)
         now = np.append(beat.clock.bend(knots.at_s), np.zeros(len(free)))
-        beat = _moved(rows, beat, knots, free, np.linalg.solve(hessian + known, pull - known @ now))
+        move = np.linalg.solve(hessian + known, scores.sum(axis=0) - known @ now)
+        beat = _moved(rows, beat, knots, free, move)
+    rest = unexplained(plan, rows, beat, weight)
+    bread = np.linalg.inv(hessian + known)
     covariance, alike_s = believable(plan, rows, beat, weight, trust, basis, known)
-    posterior = np.linalg.inv(hessian + known)
-    covariance = covariance + posterior @ known @ posterior
-    return _bent_fit(replace(fit, beat=beat, weight=weight, alike_s=alike_s), plan, rows, basis, covariance, free)
-
-
-def _bent_fit(
-    fit: Fit, plan: Plan, rows: Profiles, basis: Doubles, covariance: Doubles, free: tuple[str, ...]
-) -> Fit:  # fmt: skip
-    """Return a fit with what its beat leaves, and the errors of its shift and of the times named in ``free``."""
-    rest = unexplained(plan, rows, fit.beat, fit.weight)
-    knots = len(covariance) - len(free)
+    covariance = covariance + bread @ known @ bread
+    size = len(knots.at_s)
     return replace(
         fit,
+        beat=beat,
         rest=rest,
-        shift_error_s=mean_error(basis[:knots], covariance),
-        errors_s={name: standard_error_of(covariance[knots + n, knots + n]) for n, name in enumerate(free)},
+        weight=weight,
+        shift_error_s=mean_error(basis[:size], covariance),
+        errors_s={name: standard_error_of(covariance[size + n, size + n]) for n, name in enumerate(free)},
         explained=explained(rows, rest),
+        alike_s=alike_s,
     )
 
 
-def _knots(rows: Profiles) -> _Knots:
+def _knots(rows: Profiles) -> Knots:
     at_s = rows.ends_s
     gap_s = np.diff(at_s)
     second = np.zeros((len(at_s) - 2, len(at_s)))
     for n in range(len(second)):
         second[n, n : n + 3] = 1 / gap_s[n], -1 / gap_s[n] - 1 / gap_s[n + 1], 1 / gap_s[n + 1]
     spacing_s = (gap_s[:-1] + gap_s[1:]) / 2
-    return _Knots(at_s=at_s, penalty=second.T @ (second / spacing_s[:, None]))
+    return Knots(at_s=at_s, penalty=second.T @ (second / spacing_s[:, None]))
 
 
 def _basis(knots: int, free: tuple[str, ...]) -> Doubles:
@@ -109,9 +107,11 @@ def _basis(knots: int, free: tuple[str, ...]) -> Doubles:
     return basis
 
 
-def _known(hessian: Doubles, knots: _Knots, strength: float, inflation: float) -> Doubles:
+def known_of_bends(hessian: Doubles, knots: Knots, strength: float, inflation: float) -> Doubles:
+    """Return what is known of bends and free times beside the data, as a precision of the shape of ``hessian``."""
     size = len(knots.at_s)
-    known = 1e-9 * np.diag(np.diag(hessian) + 1e-30)
+    own = np.diag(hessian)
+    known = np.diag(np.maximum(1e-9 * own, HARDLY * own.max()) + 1e-30)
     known[:size, :size] += inflation * knots.penalty / strength
     return known
 
@@ -130,7 +130,7 @@ def _inflation(hessian: Doubles, scores: Doubles, rows: Profiles) -> float:
     return max(float(np.median(bent**2 / expected)) / 0.455, 1.0)
 
 
-def _wandering(hessian: Doubles, pull: Doubles, beat: Beat, knots: _Knots) -> tuple[float, float]:
+def _wandering(hessian: Doubles, pull: Doubles, beat: Beat, knots: Knots) -> tuple[float, float]:
     """Return the most likely strength of the rate's random walk, and its log-likelihood above a straight clock's."""
     from scipy.linalg import cho_solve_banded, cholesky_banded  # runs with a timing do without scipy
 
@@ -163,7 +163,7 @@ def _bands(matrix: Doubles) -> Doubles:
     return bands
 
 
-def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], move: Doubles) -> Beat:
+def _moved(rows: Profiles, beat: Beat, knots: Knots, free: tuple[str, ...], move: Doubles) -> Beat:
     size = len(knots.at_s)
     clock = beat.clock.bent(knots.at_s, move[:size])
     return replace(beat, clock=clock, **times_moved(rows, beat, free, move[size:]))
