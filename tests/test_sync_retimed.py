@@ -100,6 +100,15 @@ def test_frames_left_out_in_a_pattern_are_numbered_and_bridged(step: str, lead: 
     assert any("by leaving frames out" in note for note in timing.notes)
 
 
+def test_frames_left_out_in_a_pattern_are_bridged_behind_a_global_shutter(make_plan: PlanMaker) -> None:
+    """It was refused, as missing frames explain any strobe there: but not by a rule."""
+    plan = make_plan(height_px=48, width_px=12, readout=0.0)
+    shown = pattern("6/5", 0)
+    timing = retimed(plan, shown)
+    assert_placed(timing, shown)
+    assert timing.order == "marker"
+
+
 def test_a_clip_of_every_second_frame_is_found_and_said(plan: Plan) -> None:
     timing = retimed(plan, pattern("2"))
     assert_placed(timing, pattern("2"))

@@ -7,7 +7,7 @@ import numpy as np
 from psvideo.model.arrays import Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import stood_in
+from psvideo.sync.rowfit.coarse.retime import regular_step, stood_in
 from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
@@ -49,7 +49,7 @@ class ClipFit:
     edges are where that was not taken for LEDs' tails, else 0. ``across`` is how much of what split flashes show is
     explained (0 to 1) where flashes differ because the subject moves, else 0. ``unlit`` (frame,) are frames that were
     left out because no flash lights them. ``unsteady_s`` is by how much stretches of flashes are early or late, as a
-    root mean square over the clip, beyond their jitter.
+    root mean square over the clip, beyond their jitter. ``regular``: frames are missing or repeated by a rule.
     """
 
     fit: Fit
@@ -65,6 +65,7 @@ class ClipFit:
     soft_s: float = 0.0
     unsteady_s: float = 0.0
     across: float = 0.0
+    regular: bool = False
 
 
 def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipFit:
@@ -112,6 +113,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         soft_s=best.soft_s,
         unsteady_s=loose_s,
         across=across(plan, best.rows, best.fit),
+        regular=regular_step(tracked.index, rows.index) != 1,
     )
 
 

@@ -72,7 +72,7 @@ def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
     believed = convincing(meant, found) and not _feigned(plan, found)
     if believed:
         rivals = _worth_trying(plan, meant, found)
-        believed = not rivals or best_rival(meant, rows, rivals) is None
+        believed = not rivals or best_rival(meant, rows, rivals, beside=found) is None
     return _unless_elsewhere(Verdict(plan=meant, found=found, believed=believed))
 
 
@@ -100,14 +100,15 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
     """Return whether a fit has found a strobe, and not merely the least bad place for one.
 
     Brightnesses alone explain some of mere noise, which counts in short clips. Where all rows see a flash at once, a
-    frame shows little more than which one it was: enough missing frames explain nearly all of any other strobe.
+    frame shows little more than which one it was: enough missing frames explain nearly all of any other strobe, unless
+    they are missing by a rule.
     """
     rows, fit = found.rows, found.fit
     by_chance = 1 - freedom(plan, rows, fit.beat)
     share, explained = gain_of(rows, fit.rest), fit.explained
     often = too_many(found.steps, found.strayed, len(rows.value))
     strobed = explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance)) and share > max(MIN_GAIN, by_chance)
-    told = fit.beat.row_time_s > 0.0 and min(share, explained) > 0.9
+    told = (fit.beat.row_time_s > 0.0 or found.regular) and min(share, explained) > 0.9
     return (
         not shows_the_same(plan, rows, fit.beat)
         and (strobed or found.across > ACROSS)

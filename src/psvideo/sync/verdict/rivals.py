@@ -13,8 +13,9 @@ import numpy as np
 
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.search import search
-from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, first_guess, seeded
-from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, SEED_ROWS, first_guess, gain_of, seeded
+from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
 
 SHUTTERS_DEG = (360.0, 270.0, 240.0, 216.0, 180.0, 172.8, 144.0, 120.0, 90.0, 72.0, 60.0, 45.0, 22.5, 11.25)
 SHUTTERS_S = tuple(1.0 / n for n in (24, 25, 30, 48, 50, 60, 96, 100, 120, 125, 160, 200, 240, 250, 500, 1000))
@@ -34,6 +35,9 @@ CLEARLY, BETTER = 0.5, 0.85
 the plan's own fit is out of the question and the rival's will be judged for itself."""
 FAIR, GOOD = 0.4, 0.7
 """And where it takes away this share of all of it itself; the second, where no fit will judge it."""
+NEARLY = 2.0
+"""A rival without missing frames leaves at most this many times what a fit with some leaves of the same frames: missing
+ones that are true make any other plan fit better than the one that was played, and yet badly."""
 
 Fault = Literal["shutter", "readout", "flashes", "rate", "count"]
 
@@ -111,14 +115,22 @@ def likely_rates(plan: Plan) -> list[Fraction]:
 
 
 def best_rival(
-    plan: Plan, rows: Profiles, rivals: Sequence[Rival], *, least: float = GOOD, leaves: float = CLEARLY
+    plan: Plan,
+    rows: Profiles,
+    rivals: Sequence[Rival],
+    *,
+    least: float = GOOD,
+    leaves: float = CLEARLY,
+    beside: ClipFit | None = None,
 ) -> Rival | None:
     """Return the rival that explains a stretch of the clip best, or None where the plan is as good as any.
 
     ``rows`` are laid out from the picture's top row. A rival must explain the share ``least`` of the robust loss, and
-    leave less than the share ``leaves`` of what the plan leaves.
+    leave less than the share ``leaves`` of what the plan leaves where no frames are missing; and nearly as little as
+    the plan's fit ``beside``, with its missing frames, leaves of that stretch.
     """
-    part = _liveliest(plan, rows)
+    frames = _liveliest(plan, rows)
+    part = rows.take(frames).one_window()
     rough = sorted((_rough_loss(rival, part), n) for n, rival in enumerate(rivals))
     best: tuple[float, int] | None = None
     for _, n in rough[:SCREENED]:
@@ -127,17 +139,27 @@ def best_rival(
             best = share, n
     if best is None or best[0] < least or 1 - best[0] > leaves * (1 - _share(plan, part)):
         return None
+    if beside and 1 - best[0] > NEARLY * (1 - _share_of_fit(plan, rows, frames, beside)):
+        return None
     return rivals[best[1]]
 
 
-def _liveliest(plan: Plan, rows: Profiles) -> Profiles:
-    """Return the stretch, long enough to separate plans, that changes most from frame to frame."""
+def _share_of_fit(plan: Plan, rows: Profiles, frames: slice, found: ClipFit) -> float:
+    """Return which share of the robust loss of some frames a fit of all takes away."""
+    beat = replace(found.fit.beat, beat_hz=(), blur_s=0.0)
+    part = replace(rows.turned() if beat.upward else rows, index=found.track.index).take(frames).one_window()
+    few = part.binned(SEED_ROWS)
+    return gain_of(few, unexplained(plan, few, beat))
+
+
+def _liveliest(plan: Plan, rows: Profiles) -> slice:
+    """Return the stretch of frames, long enough to separate plans, that changes most from one to the next."""
     count = len(rows.value)
     length = min(count, max(LEAST_FRAMES, int(1.2 * plan.marker_s / rows.period_s) + 2))
     change = np.append(0.0, np.cumsum(np.abs(np.diff(rows.value, axis=0)).mean(axis=1)))
     starts = np.unique(np.linspace(0, count - length, 5).astype(int))
     first = max(starts.tolist(), key=lambda start: float(change[start + length - 1] - change[start]))
-    return rows.take(slice(first, first + length)).one_window()
+    return slice(first, first + length)
 
 
 def _at_rate_of(plan: Plan, rows: Profiles) -> Profiles:
