@@ -308,6 +308,26 @@ def test_a_frame_that_another_stands_in_for_is_repeated_and_missing(plan: Plan) 
     assert rms_rows(timing, shot, plan) < 0.05
 
 
+@pytest.mark.parametrize("at", [12, 13, 33])
+def test_a_frame_that_another_stands_in_for_is_so_whatever_moves_before_it(at: int, make_plan: PlanMaker) -> None:
+    """A coarse texture runs past a short readout, so that brightnesses predict nothing: the frame kept its own place,
+    and the flash there was 850 us off under a wrong name."""
+    plan = make_plan(height_px=48, width_px=12, readout=0.12)
+    walls = {slot: np.random.default_rng(slot).uniform(0.1, 0.9, (4000, 12)) for slot in plan.lit_slots}
+
+    def scene(flash: TrueFlash) -> np.ndarray:
+        first = 100 + int(11 * flash.start_s / plan.camera.frame_period_s)
+        wall = walls.get(flash.slot, np.zeros((4000, 12)))
+        return np.asarray(wall[first : first + 48], np.float32)
+
+    shot = shoot(plan, scene=scene)
+    frames = shot.frames.copy()
+    frames[at] = frames[at - 1]
+    timing = timing_from_rows(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
+    assert timing.repeated_frames == (at,)
+    assert timing.dropped_frames == (DroppedFrames(after=at, count=1),)
+
+
 def tumbling(plan: Plan) -> Callable[[TrueFlash], np.ndarray]:
     """A lumpy subject that tumbles fast in a void: its rows brighten and darken from flash to flash."""
     rows = np.arange(plan.camera.height_px) / plan.camera.height_px

@@ -21,7 +21,7 @@ from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
-from psvideo.sync.rowfit.tracking.steps_ahead import steps_ahead
+from psvideo.sync.rowfit.tracking.steps_ahead import Twins, steps_ahead
 from psvideo.sync.unbroken import unbroken
 from psvideo.sync.verdict.believed import convincing
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, expose
@@ -391,7 +391,7 @@ def test_frames_that_are_all_darker_are_not_missing_elsewhere(make_plan: PlanMak
     profiles[13:] *= 0.5
     profiles += np.random.default_rng(1).normal(0, 0.002, profiles.shape)
     beat = replace(first_guess(plan), clock=FoundClock(phase_s=PHASE_S, offset_ppm=180.0))
-    none = np.zeros(len(profiles), np.bool_)
+    none = Twins(alike=np.zeros(len(profiles), np.bool_), lit=np.zeros(len(profiles), np.bool_))
     extra = steps_ahead(plan, rows_of(plan, profiles), beat, slice(13, 37), slice(0, 13), none, -1)
     assert not extra.any()
 
@@ -404,3 +404,4 @@ def test_many_missing_frames_convince_only_where_rows_see_flashes_one_after_anot
     found = find(plan, rows_of(plan, shot_of(plan, frames=52).frames.mean(axis=2, dtype=np.float64)))
     assert convincing(plan, found)
     assert convincing(plan, replace(found, steps=2, strayed=29)) == (readout > 0)
+    assert convincing(plan, replace(found, steps=12, strayed=12, regular=True)), "by a rule"

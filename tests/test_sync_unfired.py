@@ -98,6 +98,31 @@ def test_between_dark_slots_the_missing_flashes_of_one_light_or_two_are_no_hole(
     held_with_holes_in_the_light(plan, skipped)
 
 
+@pytest.mark.parametrize(("readout", "dead"), [(0.35, 6), (0.5, 5)])
+def test_several_missing_flashes_of_lights_that_pulse_are_no_hole_and_no_other_strobe(
+    readout: float, dead: int, make_plan: PlanMaker
+) -> None:
+    """Frames in the dark were told as holes and repeated frames, and the clip was refused."""
+    plan = make_plan(height_px=48, width_px=12, readout=readout, shutter=0.5, lights=tuple("abcde"))
+    wall = np.random.default_rng(5).uniform(0.1, 0.9, (6, 48, 12))
+
+    def scene(flash: TrueFlash) -> NDArray[np.float32]:
+        pulse = 1 + 0.3 * np.sin(0.23 * flash.start_s / plan.camera.frame_period_s)
+        lit = flash.slot in plan.lit_slots and not 20 <= flash.index < 20 + dead
+        return np.asarray(lit * pulse * wall[flash.slot], np.float32)
+
+    clock = TrueClock(phase_s=0.0123, offset_ppm=80.0)
+    shot = expose(scene, plan, frames=100, clock=clock, noise=Noise(full_well_e=2e4, read_e=5))
+    timing = timing_from_rows(plan, np.arange(100), shot.frames.mean(axis=2, dtype=np.float64))
+    assert not timing.dropped_frames
+    assert not timing.repeated_frames
+    assert not any("started again" in note for note in timing.notes)
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    off_s = [np.abs(true_s - one.start_s).min() for one in timing.flashes if one.complete]
+    assert max(off_s) < 0.4 * timing.row_time_s
+    assert max(off_s) < 3 * (timing.phase_error_s or 0.0)
+
+
 @pytest.mark.parametrize("at", [52, 53])
 def test_beside_a_dark_slot_a_frame_that_stands_in_for_the_next_is_repeated(at: int, plan: Plan) -> None:
     shot = shot_of(plan, lambda _: False)

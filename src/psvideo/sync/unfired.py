@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
-from psvideo.model.rows.shutter import Pulse
 from psvideo.model.timing import Flash
 from psvideo.model.units import counted
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import row_noise
+from psvideo.sync.rowfit.tracking.misfires import first_seen, seen_flashes
 
 ROWS = 60
 PART_FRAMES = 512
@@ -163,21 +163,13 @@ def around(share: Doubles, reach: int) -> Doubles:
     return found
 
 
-def _first_frame(found: ClipFit, start_s: Doubles) -> Integers:
-    """Return the first place in time of which any row sees any of each flash, shape (flash,)."""
-    beat, rows = found.fit.beat, found.rows
-    spread_s = rows.place.max() * beat.row_time_s + beat.exposure_s
-    first: Integers = np.floor((start_s - spread_s) / rows.period_s).astype(np.int64) + 1
-    return first
-
-
 def _levels(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> _Levels:
     """Return what every lit flash gives, with brightnesses that are fitted part by part."""
     rows = replace(found.rows.one_window(), doubt=None, restless=None).binned(ROWS)
     start_s, duration_s = (np.array([getattr(one, name) for one in lit]) for name in ("start_s", "duration_s"))
     number = {slot: n for n, slot in enumerate(plan.lit_slots)}
     unknown = np.array([number[one.slot] for one in lit])
-    first = _first_frame(found, start_s)
+    first = first_seen(found.rows, found.fit.beat, start_s)
     value, error = np.full(len(lit), np.nan), np.full(len(lit), np.inf)
     parts = max(round(len(rows.value) / PART_FRAMES), 1)
     edges = np.linspace(0, len(rows.value), parts + 1).astype(int)
@@ -186,7 +178,7 @@ def _levels(plan: Plan, found: ClipFit, lit: Sequence[Flash]) -> _Levels:
         own = np.flatnonzero((first <= rows.index[end - 1]) & (first + TOUCHED > rows.index[begin]))
         if not len(own):
             continue
-        part = _Part.of(found, rows.take(span), first[own], start_s[own], duration_s[own], unknown[own])
+        part = _Part.of(found, rows.take(span), start_s[own], duration_s[own], unknown[own])
         level, unsure = part.levels(len(plan.lit_slots))
         here = (first[own] >= rows.index[begin]) | (begin == 0)
         value[own[here]], error[own[here]] = level[here], unsure[here]
@@ -208,19 +200,12 @@ class _Part:
         cls,
         found: ClipFit,
         rows: Profiles,
-        first: Integers,
         start_s: Doubles,
         duration_s: Doubles,
         unknown: Integers,
     ) -> "_Part":
-        """Lay out flashes that start and last for some seconds, each first seen in a frame at a place in time."""
-        beat = found.fit.beat
-        places = first[:, None] + np.arange(TOUCHED)
-        at = np.minimum(np.searchsorted(rows.index, places), len(rows.index) - 1)
-        since_s = places[:, :, None] * rows.period_s + rows.place * beat.row_time_s - start_s[:, None, None]
-        pulse, lasts_s = Pulse(rise_s=beat.rise_s, fall_s=beat.fall_s), duration_s[:, None, None]
-        seen = pulse.given_off(since_s + beat.exposure_s, lasts_s) - pulse.given_off(since_s, lasts_s)
-        seen *= (rows.index[at] == places)[:, :, None]
+        """Lay out flashes that start and last for some seconds."""
+        at, seen = seen_flashes(rows, found.fit.beat, start_s, duration_s, touched=TOUCHED)
         return cls(value=rows.value, at=at, seen=seen, unknown=unknown)
 
     def levels(self, lights: int) -> tuple[Doubles, Doubles]:
@@ -265,7 +250,7 @@ def only_fired(found: ClipFit, flashes: Sequence[Flash], unfired: Unfired) -> Cl
     lost = [flash for flash in flashes if flash.index in unfired.never | unfired.beside]
     if not lost:
         return found
-    first = _first_frame(found, np.array([flash.start_s for flash in lost]))
+    first = first_seen(found.rows, found.fit.beat, np.array([flash.start_s for flash in lost]))
     saw = (first[:, None] + np.arange(TOUCHED)).ravel()
     rows, fit, kept = found.rows, found.fit, ~np.isin(found.rows.index, saw)
     if not kept.any():
@@ -286,7 +271,7 @@ def remarks_on_unfired(
     lost = _lost(flashes, fired)
     for lit in dict.fromkeys(flash.lit for flash in lost):
         own = [flash for flash in lost if flash.lit == lit]
-        first = _first_frame(found, np.array([flash.start_s for flash in own]))
+        first = first_seen(found.rows, found.fit.beat, np.array([flash.start_s for flash in own]))
         frames = numbers[np.clip(np.searchsorted(found.track.index, first), 0, len(numbers) - 1)].tolist()
         last_s = max((flash.start_s for flash in fired if flash.lit == lit and flash.complete), default=-np.inf)
         shown = ", ".join(str(number) for number in frames[:MOST_NAMED]) + (" …" if len(frames) > MOST_NAMED else "")

@@ -24,6 +24,7 @@ from psvideo.sync.rowfit.strobed import least_frames, lost_somewhere, shows_stro
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, memory_frames, window_frames
 from psvideo.sync.rowfit.tracking.holes import MEMORY, settled
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
+from psvideo.sync.rowfit.tracking.misfires import losses_but_for_misfires
 from psvideo.sync.rowfit.tracking.steps_ahead import HOLDS, JUMP_COST, MOST
 from psvideo.sync.rowfit.tracking.track import FrameTrack, track
 from psvideo.sync.rowfit.unlit import still, unlit
@@ -140,7 +141,8 @@ def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, ext
     if sign < 0:
         span = slice(max(ahead.start - AFTER, 0), ahead.stop)
     asked = rows.take(span).one_window()
-    stayed = losses_of(plan, learnt, asked, beat, light)[::sign]
+    beyond = span.start > 0, span.stop < len(rows.value)
+    stayed = losses_but_for_misfires(plan, learnt, asked, beat, light, beyond=beyond)[::sign]
     odd = np.flatnonzero(stayed > usual + SUSPICIOUS)
     if not len(odd) or len(stayed) - int(odd[0]) - 1 < LEAST_AFTER:
         return None

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from psvideo.model.arrays import Integers, Mask
+from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, twins
 from psvideo.sync.rowfit.profiles import Profiles, slot_unknowns
@@ -24,6 +24,10 @@ VARIES = 0.03
 """Rows whose spread is below this share of the largest show nothing of the strobe."""
 ROWS = 60
 """Averaged to this many rows, noise hides less of it."""
+LIT = 0.1
+"""A frame is lit whose rows lie above their darkest by this share of their spreads on an average."""
+OFTEN = 0.05
+"""Lit frames of which this share look alike may do so because lights are alike."""
 LEAST_SHARE = 0.1
 """Where fewer frames than that are lit, it may be the subject that is dark."""
 
@@ -31,14 +35,27 @@ LEAST_SHARE = 0.1
 def unlit(plan: Plan, rows: Profiles) -> Mask:
     """Return the frames that are dark for longer than the plan's own dark times make any, shape (frame,)."""
     few = rows.binned(ROWS)
-    seen = few.spread > VARIES * few.spread.max()
-    frames = len(few.value)
-    rank = max(FLOOR * frames, STRAY * _longest_run(plan, rows, REPEATED_LEAST))
-    floor = np.quantile(few.value, min(rank / frames, 1.0), axis=0)
-    dark = np.maximum((few.value - floor) / few.spread, 0.0)[:, seen].mean(axis=1) < DARK / 2
+    dark = _above_floor(few, max(FLOOR * len(few.value), STRAY * _longest_run(plan, rows, REPEATED_LEAST))) < DARK / 2
     times = np.clip(1 + _longest(twins(few) & ~dark), REPEATED_LEAST, REPEATED_MOST)
     found = _in_long_runs(dark, _longest_run(plan, rows, int(times)))
     return found if (~found).mean() > LEAST_SHARE else np.zeros_like(found)
+
+
+def lit_twins(rows: Profiles) -> Mask:
+    """Return the frames that look exactly like those before them and are lit, shape (frame,): unlike two in the dark,
+    they show the same moment wherever another flash was due. None where many do, as where lights are alike."""
+    few = rows.binned(ROWS)
+    found = twins(few) & (_above_floor(few, FLOOR * len(few.value)) > LIT)
+    return found if found.mean() < OFTEN else np.zeros_like(found)
+
+
+def _above_floor(rows: Profiles, rank: float) -> Doubles:
+    """Return by how much frames lie above the darkest (that of a ``rank``, from 0) row by row, shape (frame,), in rows'
+    spreads."""
+    seen = rows.spread > VARIES * rows.spread.max()
+    floor = np.quantile(rows.value, min(rank / len(rows.value), 1.0), axis=0)
+    above: Doubles = np.maximum((rows.value - floor) / rows.spread, 0.0)[:, seen].mean(axis=1)
+    return above
 
 
 def still(plan: Plan, rows: Profiles) -> Mask:

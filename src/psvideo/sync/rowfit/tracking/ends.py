@@ -14,6 +14,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses
 from psvideo.sync.rowfit.tracking.holes import MEMORY
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
+from psvideo.sync.rowfit.tracking.misfires import losses_but_for_misfires
 from psvideo.sync.rowfit.tracking.steps_ahead import MOST
 
 AT_END = 6
@@ -57,7 +58,7 @@ def _end(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> tuple[Integ
         known = slice(max(len(index) - count - MEMORY, 0), len(index) - count)
         usual = _usual(plan, rows, index, beat, known)
         bar = max(ODD * usual, usual + SUSPICIOUS)
-        own = _fits(plan, rows, index, beat, known, index[-count:])
+        own = _fits_as_numbered(plan, rows, index, beat, known)
         repeated = bool(index[-count] == index[-count - 1])
         if own[0] < bar and not repeated:
             continue
@@ -78,6 +79,18 @@ def _usual(plan: Plan, rows: Profiles, index: Integers, beat: Beat, known: slice
     """Return how badly the last of the known frames are predicted by those before them."""
     learnt = slice(known.start, known.stop - BEFORE)
     return float(_fits(plan, rows, index, beat, learnt, index[known.stop - BEFORE : known.stop]).max())
+
+
+def _fits_as_numbered(plan: Plan, rows: Profiles, index: Integers, beat: Beat, known: slice) -> Doubles:
+    """Return how badly all frames after the known ones fit their own places, shape (frame,), but for flashes that did
+    not fire while later ones did."""
+    learnt = _ordered(rows, index, known)
+    light, onward = brightnesses(plan, learnt, beat), index[-1] > index[0]
+    asked = _ordered(rows, index, slice(known.stop, len(index)))
+    found = np.empty(len(asked.value))
+    order = np.argsort(index[known.stop :], kind="stable")
+    found[order] = losses_but_for_misfires(plan, learnt, asked, beat, light, beyond=(bool(onward), not onward))
+    return found
 
 
 def _fits(plan: Plan, rows: Profiles, index: Integers, beat: Beat, known: slice, places: Integers) -> Doubles:

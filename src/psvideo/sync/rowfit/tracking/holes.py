@@ -10,6 +10,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 from psvideo.sync.rowfit.tracking.track import FrameTrack
+from psvideo.sync.rowfit.unlit import lit_twins
 
 NATURAL = 0.1
 """A frame that looks like the one before it is repeated only where its own place in time fits worse by this much."""
@@ -23,11 +24,12 @@ def settled(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> tuple[In
     """Return the frames' places with every hole moved to where it explains the frames around it best, and the frames
     (frame,) that may as well lie on the other side of one.
 
-    While tracking, frames beside a hole are judged by brightnesses from one side only; here from both.
+    While tracking, frames beside a hole are judged by brightnesses from one side only; here from both. Behind a lit
+    frame that looks like the one before it a hole stays where it is: that frame stands in for the missing one.
     """
     index, unsure = index.copy(), np.zeros(len(index), np.bool_)
-    numbered = np.diff(rows.index)
-    for place in np.flatnonzero(np.diff(index) > numbered).tolist():
+    numbered, again = np.diff(rows.index), lit_twins(rows)[:-1]
+    for place in np.flatnonzero((np.diff(index) > numbered) & ~again).tolist():
         extra = int(index[place + 1] - index[place] - numbered[place])
         first, last = max(place + 1 - MEMORY, 0), min(place + 1 + MEMORY, len(index))
         tried = {}

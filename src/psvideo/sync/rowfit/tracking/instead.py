@@ -18,6 +18,7 @@ from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashe
 from psvideo.sync.rowfit.tracking.holes import MEMORY, NATURAL
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 from psvideo.sync.rowfit.tracking.track import FrameTrack
+from psvideo.sync.rowfit.unlit import lit_twins
 
 LONGEST = 6
 """Frames at most that holes and repeats displace until they have cancelled one another."""
@@ -29,9 +30,11 @@ BESIDE = 2
 
 def without_false_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack) -> FrameTrack:
     """Return the track with frames that were taken for repeated at their own places where a flash that never fired,
-    or a black frame, explains them as well."""
-    index = tracked.index
+    or a black frame, explains them as well. Lit ones that look exactly like those before them stay repeated."""
+    index, again = tracked.index, lit_twins(rows)
     for stretch in _cancelled(index, rows.index):
+        if again[stretch].any():
+            continue
         own = rows.index[stretch] - rows.index[stretch.start - 1] + index[stretch.start - 1]
         moved = index.copy()
         moved[stretch] = own

@@ -5,6 +5,7 @@ which a step between frames other than the one that the numbering gives costs so
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
+from psvideo.sync.rowfit.tracking.misfires import losses_but_for_misfires
 
 BLOCK = 16
 """Frames that are looked for at a time."""
@@ -22,13 +24,35 @@ JUMP_COST = 2.0
 """What an unexpected step costs, in mean losses of a frame (a frame at a wrong time costs 1 to 3)."""
 TWIN_COST = 0.2
 """What it costs to take a frame that looks exactly like the one before it for the same moment."""
+DUE = 0.2
+"""Where it is lit, and this share of another flash was due, it is that moment again: that it looks like it by chance
+costs as much as an unexpected step."""
 MOST_GAIN = 4.0
 """A camera changes its exposure by no more stops than two at once."""
 HOLDS = 1.0
 """A step is believed where it takes away this share of the frames' losses once brightnesses are fitted again."""
 
 
-def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Mask, sign: int) -> Integers:
+class Twins(NamedTuple):
+    """Frames that look exactly like the one before them, ``alike`` (frame,), and those of them that are ``lit``."""
+
+    alike: Mask
+    lit: Mask
+
+    def of(self, block: slice, sign: int) -> "Twins":
+        """Return those of some frames, of which each looks like the one that was followed before it."""
+        if sign > 0:
+            return Twins(self.alike[block], self.lit[block])
+        return Twins(*(np.append(one[block][1:], one[block.stop]) for one in self))
+
+    def turned(self, sign: int) -> "Twins":
+        """Return the same in the order in which frames are followed."""
+        return Twins(self.alike[::sign], self.lit[::sign])
+
+
+def steps_ahead(
+    plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Twins, sign: int
+) -> Integers:
     """Return by how many frames more than the numbering says the frames of the next block are away, shape (frame,).
 
     Where all is as usual, this is for the whole block; where not, for its nearer half, so that the other half is looked
@@ -40,17 +64,36 @@ def steps_ahead(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: sli
     usual = float(np.median(losses_of(plan, learnt, learnt, beat, light)))
     ahead = rows.take(block)
     loss = losses_of(plan, learnt, ahead, beat, light)
-    same = twins[block] if sign > 0 else np.append(twins[block][1:], twins[block.stop])
-    if not same.any() and (_calm(loss, usual) or _calm(_losses_but_for_gain(plan, learnt, ahead, beat, light), usual)):
+    same = twins.of(block, sign)
+    if not same.alike.any() and (
+        _calm(loss, usual) or _calm(_losses_but_for_gain(plan, learnt, ahead, beat, light), usual)
+    ):
         return np.zeros(len(loss), np.int64)
     extras = np.arange(LEAST, MOST + 1)
     shifted = [replace(ahead, index=ahead.index + sign * int(extra)) for extra in extras]
     table = np.stack([losses_of(plan, learnt, one, beat, light) for one in shifted], axis=1)
-    course = _cheapest(table, same) if sign > 0 else _cheapest(table[::-1], same[::-1])[::-1]
-    if course.any() and not _holds(plan, rows, beat, known, block, course, sign):
+    beyond = block.start > 0, block.stop < len(rows.value)
+    table[:, -LEAST] = losses_but_for_misfires(plan, learnt, ahead, beat, light, beyond=beyond)
+    if same.lit.any():
+        same = same._replace(lit=same.lit & _due(plan, ahead, beat, sign))
+    course = _cheapest(table[::sign], same.turned(sign), sign)[::sign]
+    again = _repeats_alone(course[::sign], same.turned(sign), sign)
+    if course.any() and not again and not _holds(plan, rows, beat, known, block, course, sign):
         course = np.zeros(len(loss), np.int64)
     nearer = max(len(loss) // 2, min(len(loss), 4))
     return course[:nearer] if sign > 0 else course[-nearer:]
+
+
+def _due(plan: Plan, rows: Profiles, beat: Beat, sign: int) -> Mask:
+    """Return which frames (frame,) were to show other flashes than the one followed before, by the plan and their
+    places in time: brightnesses say little of it where the subject moves."""
+    before = replace(rows, index=rows.index - sign)
+    change = np.zeros(rows.value.shape)
+    for light in np.eye(1 + len(plan.lit_slots))[1:]:
+        own = np.tile(np.append(light, np.zeros(2 * len(beat.beat_hz))), (rows.value.shape[1], 1))
+        change += np.abs(predictions(plan, rows, beat, own) - predictions(plan, before, beat, own))
+    due: Mask = change.mean(axis=1) > DUE
+    return due
 
 
 def _calm(loss: Doubles, usual: float) -> bool:
@@ -96,17 +139,25 @@ def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, c
     return float(gain.sum()) > HOLDS
 
 
-def _cheapest(table: Doubles, twin: Mask) -> Integers:
-    """Return the course of least cost through a table (frame, extra); no frame comes before the one before it."""
+def _cheapest(table: Doubles, twins: Twins, sign: int) -> Integers:
+    """Return the course of least cost through a table (frame, extra); no frame comes before the one before it.
+
+    A frame that stands in for another shows what came before. Followed towards the clip's end, frames that are alike
+    take the place of the first, and the one after them goes on from its own; towards the beginning, the first of them
+    to be met is as far away as the last.
+    """
     extras = np.arange(LEAST, MOST + 1)
     step = extras[None, :] - extras[:, None]  # from the row's state to the column's
     usual = np.where(step == 0, 0.0, np.where(step < -1, np.inf, JUMP_COST + 0.05 * np.abs(step)))
-    after_twin = np.where(step == 1, TWIN_COST, usual)
-    to_twin = np.where(step == -1, 0.0, usual + TWIN_COST)
+    beside = _alike_beside(twins.alike, sign)
     cost = np.where(extras == 0, 0.0, np.inf)
     back = np.zeros(table.shape, np.int64)
     for n in range(len(table)):
-        price = to_twin if twin[n] else after_twin if n and twin[n - 1] else usual
+        price = usual
+        if twins.alike[n]:
+            price = np.where(step == -1, 0.0, usual + (JUMP_COST if twins.lit[n] else TWIN_COST))
+        elif beside[n]:
+            price = np.where((step > 0) & (step <= beside[n]), TWIN_COST, usual)
         whole = cost[:, None] + price
         back[n] = whole.argmin(axis=0)
         cost = whole.min(axis=0) + table[n]
@@ -116,3 +167,19 @@ def _cheapest(table: Doubles, twin: Mask) -> Integers:
         course[n] = extras[state]
         state = int(back[n, state])
     return course
+
+
+def _alike_beside(alike: Mask, sign: int) -> Integers:
+    """Return how many frames in a row just behind each one (ahead of it where ``sign`` is -1) are alike, (frame,)."""
+    count = np.zeros(len(alike), np.int64)
+    along = alike if sign > 0 else alike[::-1]
+    for n in range(1, len(alike)):
+        count[n] = count[n - 1] + 1 if along[n - 1] else 0
+    return count[::sign]
+
+
+def _repeats_alone(course: Integers, twins: Twins, sign: int) -> bool:
+    """Return whether a course is nothing but lit frames that stand in for others."""
+    steps, beside = np.diff(course, prepend=0), _alike_beside(twins.alike, sign)
+    told = np.where(twins.alike, twins.lit & (steps == -1), (steps >= 0) & (steps <= beside))
+    return bool(twins.alike.any() and told.all() and course[-1] == 0)

@@ -17,7 +17,8 @@ from psvideo.sync.rowfit.coarse.retime import twins as twin_frames
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses
-from psvideo.sync.rowfit.tracking.steps_ahead import BLOCK, steps_ahead, with_steps
+from psvideo.sync.rowfit.tracking.steps_ahead import BLOCK, Twins, steps_ahead, with_steps
+from psvideo.sync.rowfit.unlit import lit_twins
 
 LEAST_ANCHOR = 12
 AGREEING = 4
@@ -82,7 +83,8 @@ def _follow(
     plan: Plan, rows: Profiles, base: Beat, span: slice, sign: int, *, memory: int, leap: Leap | None
 ) -> _Followed:
     """Follow the strobe from the frames ``span`` to the clip's end (``sign`` 1) or to its beginning (-1)."""
-    index, twins, now, late = rows.index, twin_frames(rows), base, list[tuple[float, float]]()
+    index, now, late = rows.index, base, list[tuple[float, float]]()
+    twins = Twins(alike=twin_frames(rows), lit=lit_twins(rows))
     low, high = span.start, span.stop
     while high < len(index) if sign > 0 else low > 0:
         block = slice(high, min(high + BLOCK, len(index))) if sign > 0 else slice(max(low - BLOCK, 0), low)
