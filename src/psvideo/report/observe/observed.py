@@ -250,7 +250,7 @@ class Observed:
     def look_at_slopes(self, surface: Surface) -> Averaged:
         """Look whether normals are those of one surface, which faces the camera; return them coarsely."""
         small = coarse_normals(surface)
-        agreement = surface_agreement(surface, small)
+        agreement = surface_agreement(surface, small, lights=len(self.lights))
         if agreement is not None:
             self.slopes.append(agreement)
         self.away.append(share_away(surface))

@@ -185,7 +185,7 @@ def trust_note(method: Method, lights: int) -> str:
     if lights == 3:
         return trusted + (
             "Three lights explain any three brightnesses exactly: highlights, soft shadows or light from neighbouring "
-            "surfaces cannot be seen."
+            "surfaces cannot be seen, but where normals belong to no surface."
         )
     if method == "least-squares":
         return trusted + (

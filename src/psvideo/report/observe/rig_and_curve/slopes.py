@@ -14,6 +14,7 @@ from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
 from psvideo.report.observe.thinned import thin_surface
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
 WIDTH_PX = 320
 LEAST_PIXELS, LEAST_AWAY = 400, 50
@@ -76,12 +77,13 @@ def slope_agreement(small: Averaged) -> float | None:
     return found.agreement
 
 
-def surface_agreement(surface: Surface, small: Averaged) -> float | None:
+def surface_agreement(surface: Surface, small: Averaged, *, lights: int) -> float | None:
     """Return the agreement of slopes over all that three lights gave (``small``, as ``coarse_normals`` gives it), or
     over what is trusted where that speaks clearly for the lights: shadows and light by way of other surfaces make
-    normals of no surface too, and what they make is not trusted."""
+    normals of no surface too, and what they make is not trusted. Of just three (``lights`` is their number) only what
+    is one surface is trusted, and says nothing."""
     agreement = slope_agreement(small)
-    if agreement is None or agreement >= TRUSTED_AGREE:
+    if agreement is None or agreement >= TRUSTED_AGREE or lights <= ALL_EXPLAINED:
         return agreement
     own = _mean_of_squares(surface.valid) > WHOLE
     if own.sum() < LEAST_TRUSTED * small.valid.sum():

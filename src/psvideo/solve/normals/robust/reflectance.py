@@ -93,7 +93,7 @@ def _points(
     normals: Doubles, to_camera: Doubles,
 ) -> SubjectPoints:  # fmt: skip
     samples = samples.reshape(*samples.shape[:2], -1)
-    sent = _sent(lit, at)
+    sent = sent_to(lit, at)
     size = np.linalg.norm(sent, axis=-1)
     here = seen & (samples.max(axis=-1) < usable.saturation)
     each = samples / (size[..., None] * lit.intensities[:, None, : samples.shape[-1]])
@@ -115,8 +115,9 @@ def _points(
     )
 
 
-def _sent(lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Doubles:
-    """Return what lights of the same intensities send to points: direction times share, (light, point, 3)."""
+def sent_to(lit: Illumination, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Doubles:
+    """Return what lights of the same intensities send to points at rows and columns of the picture: direction times
+    share, (light, point, 3)."""
     field = lit.near
     if field is None:
         return np.repeat(lit.directions[:, None], len(at[0]), axis=1)

@@ -97,7 +97,8 @@ def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: J
         return surface
     measured = surface.valid if surface.source is None else surface.source == MEASURED
     points, signs = looked_at(replace(surface, valid=measured, error_deg=None, residual=None), one, noise, how=how)
-    unchecked = replace(signs, unchecked_deg=unchecked_deg(points.planes, one.lit.directions))
+    spread_deg = unchecked_deg(points.planes, one.lit.directions)
+    unchecked = replace(signs, unchecked_deg=spread_deg, torn_share=np.ones_like(spread_deg))
     shown, whole = (doubt_deg(each, how=how.doubting) for each in (signs, unchecked))
     more = np.sqrt(np.maximum(whole * whole - shown * shown, np.float32(0)))
     rows, cols = error.shape

@@ -20,6 +20,7 @@ from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, torn_share
 
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
@@ -43,8 +44,10 @@ class Signs:
     sample to sample, as errors of codecs do and surfaces do not: of that nothing is hidden. ``likely_misfit_deg``,
     ``likely_torn_deg``: the first and third without a margin for what noise could be instead; ``noise_deg`` is what
     noise makes of the normals. ``unchecked_deg``: what lights that cannot be held against each other leave of real
-    surfaces, though nothing shows; it counts in errors, and not in what is trusted. ``by_model_deg``: by how much the
-    model of the subject's reflectance would turn the normals under four and five lights (``few_checked.py``)."""
+    surfaces, though nothing shows; it counts in errors, and not in what is trusted. ``torn_share``: under lights that
+    cannot be held against each other, by how much of themselves torn normals count; None where other signs speak too.
+    ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals under four and five
+    lights (``few_checked.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -55,6 +58,7 @@ class Signs:
     likely_torn_deg: Floats
     noise_deg: Floats
     plain: bool = False
+    torn_share: Floats | None = None
     uneven: Floats | float = 0.0
     unchecked_deg: Floats | float = 0.0
     by_model_deg: Floats | float = 0.0
@@ -62,7 +66,8 @@ class Signs:
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
         shape = self.misfit_deg.shape
-        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("hidden", "plain")}
+        named = (one.name for one in fields(self) if one.name not in ("hidden", "plain"))
+        each = {name: getattr(self, name) for name in named if getattr(self, name) is not None}
         here: dict[str, Any] = {name: np.broadcast_to(value, shape)[some] for name, value in each.items()}
         return replace(self, **here)
 
@@ -99,6 +104,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         lost_deg=points.noise_deg * np.sqrt(one.indirect.wider - 1),
         hidden=hidden_by(lights) / hidden_by(ENOUGH_LIGHTS),
         plain=plain,
+        torn_share=None if lights > ALL_EXPLAINED else torn_share(points, one.lit),
         by_model_deg=0.0 if by_model is None else by_model,
     )
 

@@ -3,11 +3,17 @@
 What is not matte, light from around and a rig that is a little off turn normals all the same, and show nowhere. All
 that is known of it beforehand is by how much they do on objects whose normals were measured. So such an error holds
 over subjects, and of one of them it is a guess: too large for one that is matte, too small for one that shines.
+
+What shows is normals that belong to no surface. There something is wrong, most likely where one light gives little: in
+its shadow, light that comes by way of other surfaces passes for light that grazes.
 """
 
 import numpy as np
 
 from psvideo.model.arrays import Floats
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.robust.reflectance import sent_to
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
 ALL_EXPLAINED = 3
 """This many lights leave no residual."""
@@ -30,3 +36,27 @@ def unchecked_deg(normals: Floats, directions: np.ndarray) -> Floats:
     along = np.einsum("irc,ij,jrc->rc", normals, inverse, normals)
     spread = np.sqrt(np.maximum(np.trace(inverse) - along, np.float32(0)))
     return np.asarray(OF_MATERIALS_DEG * np.sqrt(spread), np.float32)
+
+
+DIM, BRIGHT = np.float32(0.25), np.float32(0.75)
+"""A light that gives less than the first share of what a point's lights give in the mean may not reach it; one that
+gives more than the second does. (Light from around is up to 0.2 in wide creases.)"""
+TORN_IN_LIGHT = np.float32(3)
+"""Where all lights reach, normals that belong to no surface count so many times less: creases and outlines make such as
+well, most of them in small pictures."""
+
+
+def torn_share(points: ThinSurface, lit: Illumination) -> Floats:
+    """Return by how much of themselves normals that belong to no surface count at every point, (row, col): wholly where
+    a light may not reach, less where all do."""
+    if lit.near is None:
+        towards = lit.directions.astype(np.float32)[..., None, None]
+    else:
+        at = np.indices(points.known.shape).reshape(2, -1) * points.step
+        sent = sent_to(lit, (at[0], at[1])).astype(np.float32)
+        sent /= np.linalg.norm(sent, axis=-1, keepdims=True)
+        towards = np.moveaxis(sent, -1, 1).reshape(len(sent), 3, *points.known.shape)
+    cosines = (towards * points.planes).sum(axis=1)
+    mean = np.maximum(cosines, 0).mean(axis=0)
+    reaches = (cosines.min(axis=0) / np.maximum(mean, np.float32(1e-6)) - DIM) / (BRIGHT - DIM)
+    return np.asarray(1 / (1 + (TORN_IN_LIGHT - 1) * np.clip(reaches, 0, 1)), np.float32)
