@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from ring_and_ball import ring
 
 import psvideo as ps
 from psvideo.model.coded import Coded, Tone
@@ -261,3 +262,23 @@ def test_filled_normals_are_unit_vectors_where_two_lights_shine_from_almost_one_
     length = np.linalg.norm(surface.normals[z > 0.1], axis=-1)
     assert (surface.valid[z > 0.1]).mean() < 0.8
     np.testing.assert_allclose(length, 1, atol=1e-3)
+
+
+def test_what_is_estimated_is_as_far_off_as_what_was_measured_around_it() -> None:
+    normals, _ = ball(400.0)
+    lights = ring(6, 40)
+    plates = plates_of(normals, np.array([0.5, 0.4, 0.3]), lights=lights)
+    half, (high, wide) = normals.shape[1] // 2, normals.shape[:2]
+    hole = np.zeros((high, wide), bool)
+    for middle in (half // 2, half + half // 2):
+        hole[high // 2 - 4 : high // 2 + 4, middle - 4 : middle + 4] = True
+    for number, plate in enumerate(plates):
+        plate[:, half:] *= 1.25 if number % 2 else 0.8  # as if that half had other lamps
+        plate[hole] *= number < 2  # all others are in shadow
+    surface = Solving(error=True).solve(plates, lit_by(lights))
+    assert surface.source is not None
+    assert surface.error_deg is not None
+    assert (surface.source[hole] == TWO_LIGHTS).all()
+    clean, spoilt = hole.copy(), hole.copy()
+    clean[:, half:], spoilt[:, :half] = False, False
+    assert np.median(surface.error_deg[spoilt]) > 1.5 * np.median(surface.error_deg[clean])
