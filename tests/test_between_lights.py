@@ -101,3 +101,43 @@ def test_what_leaves_the_picture_is_not_looked_for_far_away(
     found = followed_at(shown, 0.0)
     assert bool(asked) == far
     assert np.abs(found.velocity[0][24:-24, 64:-64] + px / ROUND_S).mean() < 1.5
+
+
+WAVE_PX = 66.0
+"""From one fold of a waving cloth to the next."""
+FOLDS = (192, 256)
+
+
+def waving(light: int, time_s: float, px: float) -> Sketch:
+    """The codes of a cloth whose folds go so far to the right in a round; its faint paint sways with them."""
+    y, x = np.mgrid[: FOLDS[0], : FOLDS[1]].astype(np.float64)
+    phase = 2 * np.pi / WAVE_PX * (x + 0.35 * y - px * time_s / ROUND_S)
+    other = 2 * np.pi * y / 90 + np.pi / WAVE_PX * px * time_s / ROUND_S
+    steep = 2 * np.pi / WAVE_PX * 9 * np.cos(phase)
+    normals = np.stack([-steep, -0.35 * steep - 2 * np.pi / 90 * 5 * np.cos(other), np.ones_like(x)])
+    normals /= np.linalg.norm(normals, axis=0)
+    turn = 2 * np.pi * light / 3 + 0.35
+    lit = np.tensordot([0.57 * np.cos(turn), 0.57 * np.sin(turn), 0.82], normals, 1)
+    skin = np.random.default_rng(2).normal(size=(2, FOLDS[0] + 64, FOLDS[1] + 64))
+    paint = sum(
+        size * cv2.GaussianBlur(one, (0, 0), wide) for one, size, wide in zip(skin, (1.4, 0.25), (6, 2), strict=True)
+    )
+    sway = [place.astype(np.float32) for place in (x + 32 + 6 * np.cos(phase), y + 32 + 4 * np.sin(other))]
+    shown = (
+        0.5 * (1 + cv2.remap(np.asarray(paint, np.float32), sway[0], sway[1], cv2.INTER_LINEAR)) * np.maximum(lit, 0)
+    )
+    noise = np.random.default_rng([light, int(1000 * (time_s + 5))]).normal(0, 1, FOLDS)
+    codes = np.asarray(np.clip(255 * np.sqrt(shown) + noise, 0, 255), np.uint8)
+    blocks = codes.reshape(FOLDS[0] // 8, 8, FOLDS[1] // 8, 8).mean(axis=(1, 3)).astype(np.float32)
+    return Sketch(number=1, time_s=time_s, codes=codes, seen=np.ones((FOLDS[0], 1), np.bool_), blocks=blocks, white=1.0)
+
+
+@pytest.mark.parametrize("px", [11.0, 16.0])
+def test_folds_under_three_lights_are_not_followed_to_the_next_but_one(px: float) -> None:
+    times_s = ROUND_S / 4 * (np.arange(3) - 1)
+    shown = [
+        Pair(before=waving(light, one, px), after=waving(light, one + ROUND_S, px))
+        for light, one in enumerate(times_s - ROUND_S * (times_s > 0))
+    ]
+    found = followed_at(shown, 0.0)
+    assert (np.hypot(*found.velocity) * ROUND_S > WAVE_PX / 2).mean() < 0.05

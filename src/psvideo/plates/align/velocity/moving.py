@@ -34,6 +34,12 @@ if the moving share of its window exceeds the resting share by the second."""
 PUZZLING, PUZZLED = 0.5, 0.004
 """Where more of the picture than the second differs by more than the first per light, things move faster than flow can
 follow."""
+UNCHECKED = 3
+"""So many lights explain whatever their plates show: nothing tells later that these were brought together falsely."""
+FARTHER_PX, FARTHER, AGREEING, BETTER = 27, 0.65, 0.9, 0.3
+"""Of so few, displacements farther than flow reaches are taken where, over the first, they leave less than the second
+of what flow leaves; the third is enough where lights disagree by the fourth less. Waves and folds fit the next of their
+kind nearly as well as themselves, and a fence's posts do so from round to round alone."""
 REFUTED_PX, AGREED, WORSE = 27, 0.35, 0.1
 """Where lights disagree by less than the second at rest, over the first, and by the third more along a motion, it is
 not the true one: what repeats itself fits the next of its kind from round to round, but not from flash to flash. A
@@ -49,7 +55,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     none = np.zeros((2, *lights.shape), np.float32)
     rest = lights.unlike(none)
     wide_rest, fine_rest = lights.mean(rest, WINDOW_PX), lights.mean(rest, FINE_PX)
-    velocity, best = _best(lights, wide_rest)
+    velocity, best = _best(lights, between, wide_rest)
     fine = lights.mean(lights.unlike(velocity), FINE_PX)
     stirs = lights.stirs()
     moves = _clearly(best, wide_rest, lights.count) & (fine < np.float32(FINE_EXPLAINED) * fine_rest) & stirs
@@ -63,24 +69,32 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     return Followed(time_s=time_s, velocity=velocity, moves=moves, rests=rests & ~moves, step=lights.step)
 
 
-def _best(lights: AllLights, wide_rest: Floats) -> tuple[Floats, Floats]:
+def _best(lights: AllLights, between: BetweenLights, wide_rest: Floats) -> tuple[Floats, Floats]:
     """Return, of all proposed velocities, the one for every pixel along which plates are the most alike, and how unlike
-    they are. Far ones are proposed where much of the picture is puzzling."""
-    velocity, best = np.zeros((2, *lights.shape), np.float32), np.full(lights.shape, np.inf, np.float32)
-    for proposed in lights.proposed():
-        _take_better(lights, proposed, velocity, best)
+    they are. Far ones are proposed where much of the picture is puzzling; under few lights they must explain clearly
+    more."""
+    velocity, best = _most_alike(lights, lights.proposed())
     puzzling = np.minimum(best, wide_rest) > PUZZLING * lights.count
     if np.mean(puzzling & lights.stays(velocity)) > PUZZLED:
-        for proposed in lights.proposed_far():
-            _take_better(lights, proposed, velocity, best)
+        far, least = _most_alike(lights, lights.proposed_far())
+        better = least < best
+        if lights.count <= UNCHECKED:
+            gained = between.disagree(velocity, FARTHER_PX) - between.disagree(far, FARTHER_PX)
+            share = np.where(gained > np.float32(BETTER), np.float32(AGREEING), np.float32(FARTHER))
+            better = lights.mean(least, FARTHER_PX) < share * lights.mean(best, FARTHER_PX)
+        np.copyto(best, least, where=better)
+        np.copyto(velocity, far, where=better)
     return velocity, best
 
 
-def _take_better(lights: AllLights, proposed: Floats, velocity: Floats, best: Floats) -> None:
-    unlike = lights.mean(lights.unlike(proposed), WINDOW_PX)
-    better = unlike < best
-    np.copyto(best, unlike, where=better)
-    np.copyto(velocity, proposed, where=better)
+def _most_alike(lights: AllLights, proposals: Sequence[Floats]) -> tuple[Floats, Floats]:
+    velocity, best = np.zeros((2, *lights.shape), np.float32), np.full(lights.shape, np.inf, np.float32)
+    for proposed in proposals:
+        unlike = lights.mean(lights.unlike(proposed), WINDOW_PX)
+        better = unlike < best
+        np.copyto(best, unlike, where=better)
+        np.copyto(velocity, proposed, where=better)
+    return velocity, best
 
 
 def _refuted(rested: Floats, moved: Floats) -> Flags:
