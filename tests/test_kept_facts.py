@@ -43,6 +43,7 @@ def _facts(number: int, seed: random.Random, lights: int = 4) -> InstantFacts:
         moving_share=perhaps(),
         misfit=misfit if seed.random() < 0.5 else None,
         measured_share=perhaps(),
+        moving_valid_share=perhaps(),
     )
 
 

@@ -10,6 +10,7 @@ from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
 from psvideo.report.judge.of_timing import timing_and_order
+from psvideo.report.judge.of_what_moves import what_moves
 from psvideo.report.judge.result import accuracy, distance, first_of_all, focus, steadiness, validity
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
@@ -48,5 +49,6 @@ def judgements(
         *accuracy(observed),
         *distance(observed),
         *validity(observed, first=first_of_all((*exposed, *lit), curve_doubted=bool(curve_doubt))),
+        *what_moves(observed.facts, aligned=aligned),
         *steadiness(observed.facts),
     )

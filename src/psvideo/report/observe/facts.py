@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
+from psvideo.model.arrays import Flags
 from psvideo.model.channels import brightest_channel
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.light_plate import LightPlate
@@ -21,6 +22,8 @@ LIT = 0.01
 of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
 FAINT = 2.0**-12
+FEWEST_MOVING = 32
+"""Of fewer points that move no share is known."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -35,7 +38,8 @@ class InstantFacts:
     saturated, ``white`` (light) the light at which its plate is.
     ``ambient`` is the ambient light's share of what an exposure holds. ``speed_px_s`` is how fast the fastest parts
     move, and ``moving_share`` how much of the picture does; None where it is not known. What changes too fast to be
-    followed has a share and no speed.
+    followed has a share and no speed. ``moving_valid_share`` is which share is valid of what moves and three lights
+    reach, moving shadows too; None where hardly anything does.
     ``misfit`` is what the robust solver found common to the whole picture.
     """
 
@@ -54,6 +58,7 @@ class InstantFacts:
     moving_share: float | None = None
     misfit: Misfit | None = None
     measured_share: float | None = None
+    moving_valid_share: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,10 +110,12 @@ def instant_facts(
     *,
     seen: Seen | None = None,
     moving: Motion | None = None,
+    stirs: Flags | None = None,
     dark: Dark | None = None,
 ) -> InstantFacts:
-    """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``dark`` the
-    ambient light, thinned out as ``seen`` is. Of a mask that holds none of the points, nothing is known."""
+    """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``stirs`` what
+    moves in it, on any grid, ``dark`` the ambient light, thinned out as ``seen`` is. Of a mask that holds none of the
+    points, nothing is known."""
     seen = seen or thinned_round(one, mask)
     subject, bright = seen.subject, seen.bright
     valid, measured = (None, None) if slips(mask) else _shares(surface, subject)
@@ -142,7 +149,18 @@ def instant_facts(
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
+        moving_valid_share=None if surface is None or stirs is None else _moving_valid(surface, subject, stirs),
     )
+
+
+def _moving_valid(surface: Surface, subject: Flags, stirs: Flags) -> float | None:
+    """Return which share is valid of what moves and was measured."""
+    (rows, cols), (high, wide) = subject.shape, stirs.shape
+    moves = stirs[np.ix_(np.arange(rows) * high // rows, np.arange(cols) * wide // cols)]
+    some = thin_surface(surface)
+    there = subject & moves & (some.measured if surface.source is not None else some.shown)
+    count = int(there.sum())
+    return float((some.valid & there).sum() / count) if count >= FEWEST_MOVING else None
 
 
 def _shares(surface: Surface | None, subject: NDArray[np.bool_]) -> tuple[float | None, float | None]:

@@ -9,7 +9,7 @@ from psvideo.model.surface import Misfit, Reflectance
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.steadiness import Change
 
-_FIXED = Struct("=qI16d")
+_FIXED = Struct("=qI17d")
 """A round's number, of how many lights there are levels, and what it has one number for; NaN is what is not known."""
 
 
@@ -64,7 +64,8 @@ def _packed(one: InstantFacts) -> bytes:
     if one.misfit is not None:
         found = one.misfit
         misfit = (found.share, found.error_deg, found.noise_deg, found.distance_share)
-    known = (one.valid_share, one.ambient, one.speed_px_s, one.moving_share, one.measured_share)
+    known = (one.valid_share, one.ambient, one.speed_px_s, one.moving_share, one.measured_share,
+             one.moving_valid_share)  # fmt: skip
     fixed = _FIXED.pack(
         one.number,
         len(one.levels),
@@ -82,8 +83,8 @@ def _packed(one: InstantFacts) -> bytes:
 
 def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
     number, count, time_s, clipped_share, unseen_share, borrowed_share, *rest = _FIXED.unpack_from(packed)
-    valid, ambient, speed_px_s, moving, measured = (None if isnan(value) else value for value in rest[:5])
-    change, misfit = rest[5:8], rest[8:]
+    valid, ambient, speed_px_s, moving, measured, held = (None if isnan(value) else value for value in rest[:6])
+    change, misfit = rest[6:9], rest[9:]
     lights = memoryview(packed)[_FIXED.size :].cast("d")
     return InstantFacts(
         number=number,
@@ -102,6 +103,7 @@ def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
         ambient=ambient,
         speed_px_s=speed_px_s,
         moving_share=moving,
+        moving_valid_share=held,
         misfit=None
         if isnan(misfit[0])
         else Misfit(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
-from psvideo.model.arrays import Bytes
+from psvideo.model.arrays import Bytes, Flags
 from psvideo.plates.align.velocity.flow import TOE, pixel_places
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
@@ -23,6 +23,8 @@ LEAST_BLOCKS = 0.002
 """A share of the blocks that changed which is no more than chance."""
 FASTEST = 0.95
 """The speed reported is that of the fastest twentieth of what moves."""
+BESIDE_PX = 9
+"""What changes lies well within the blocks that changed: these reach beyond it by half of this."""
 RETURN_PX = 0.7
 EXPLAINED, DETAIL_PX, SHADING_CODES = 0.7, 9, 12.0
 """What changed is explained where plates differ along the flow by less than this share of what they do at rest,
@@ -48,10 +50,12 @@ class Glimpse:
 @dataclass(frozen=True, kw_only=True)
 class Motion:
     """Speed of the fastest things in pixels of the picture per second, and which share of the picture moves. The speed
-    is None where most of what changes cannot be followed from one round to the next."""
+    is None where most of what changes cannot be followed from one round to the next. ``changed`` (row, col), of the
+    glimpses' pixels, is what they do not show alike, moving shadows too; None where nothing changed."""
 
     speed_px_s: float | None
     share: float
+    changed: Flags | None = None
 
 
 def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
@@ -96,10 +100,10 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     returns = changed & _returns(forward, backward)
     followed = returns & _explained(one, other, forward)
     if followed.sum() < FOLLOWED * changed.sum():
-        return Motion(speed_px_s=None, share=float(changed.mean()))
+        return Motion(speed_px_s=None, share=float(changed.mean()), changed=_well_within(changed))
     way = np.hypot(forward[..., 0], forward[..., 1])[followed] * before.scale
     speed = quantile(way, FASTEST) / abs(after.time_s - before.time_s)
-    return Motion(speed_px_s=speed, share=float(returns.mean()))
+    return Motion(speed_px_s=speed, share=float(returns.mean()), changed=_well_within(changed))
 
 
 def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -113,6 +117,10 @@ def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np
     squares = cv2.blur(mean * mean, (8, 8))
     local = np.sqrt(np.maximum(squares, 0))  # running sums may leave a little less than nothing
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))
+
+
+def _well_within(changed: Flags) -> Flags:
+    return np.asarray(cv2.erode(changed.view(np.uint8), np.ones((BESIDE_PX, BESIDE_PX), np.uint8)) > 0)
 
 
 def _explained(one: NDArray[np.float32], other: NDArray[np.float32], way: NDArray[np.float32]) -> NDArray[np.bool_]:

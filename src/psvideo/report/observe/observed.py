@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Masks
 from psvideo.compute.ranks import quantile
-from psvideo.model.arrays import Integers
+from psvideo.model.arrays import Flags, Integers
 from psvideo.model.channels import brightest_channel
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Surface
@@ -98,6 +98,8 @@ class Observed:
     _sample: Sample | None = None
     _dark: Dark | None = None
     _moving: Motion | None = None
+    _moving_before: Motion | None = None
+    _before_s: float = 0.0
     _passed: bool = False
     _fit: tuple[tuple[int, bytes], RigFit | None] | None = field(default=None, init=False)
     """What the rig's fit was asked of, so many rounds and these lights, and what came out: a report asks three times,
@@ -164,8 +166,8 @@ class Observed:
                 self._glance(plate)
         self.watch_brightest()
         yield
-        moving, changed = self._moving, self._change(surface)
-        facts = instant_facts(one, surface, mask, changed, seen=seen, moving=moving, dark=self._dark)
+        moving, changed, stirs = self._moving, self._change(surface), self._stirring(one.time_s)
+        facts = instant_facts(one, surface, mask, changed, seen=seen, moving=moving, stirs=stirs, dark=self._dark)
         self.facts.append(facts)
         yield
         for plate, bright, shown in zip(one.plates, seen.bright, seen.shown, strict=True):
@@ -288,7 +290,19 @@ class Observed:
         before = self._glimpse
         self._glimpse = glimpse(plate, self.white)
         self.white = self._glimpse.white
-        self._moving = None if before is None else motion_between(before, self._glimpse)
+        self._moving_before, self._moving = self._moving, None
+        if before is not None:
+            self._moving, self._before_s = motion_between(before, self._glimpse), before.time_s
+
+    def _stirring(self, time_s: float) -> Flags | None:
+        """Return what moves at an instant, of the glimpses' pixels: what changed until then and changes from then on,
+        where the next plate was seen already; else what changed until then, with what came out from behind."""
+        if self._moving is None or self._moving.changed is None or self._glimpse is None:
+            return None
+        latest, before = self._moving.changed, self._moving_before
+        if before is None or time_s > (self._before_s + self._glimpse.time_s) / 2:
+            return latest
+        return None if before.changed is None else latest & before.changed
 
     def _change(self, surface: Surface | None) -> Change | None:
         before, self._sample = self._sample, None if surface is None else sample_of(surface)
