@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
-from psvideo.plates.align import between, light_history
+from psvideo.plates.align import between
+from psvideo.plates.align import packed as packed_pictures
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.unsure import UNKNOWN
 from psvideo.plates.align.open_shutter import with_open_shutter
-from psvideo.plates.align.packed import PutBy, packed
+from psvideo.plates.align.packed import Packing, PutBy, packed
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity import all_lights, flow
 from psvideo.plates.align.velocity.followed import Followed
@@ -291,13 +292,13 @@ def test_no_more_plates_are_held_than_instants_need(
                 yield own
                 del own
 
-    def watched(picture: Mixture, saturation: float, put_by: PutBy | None = None, **known: Any) -> Mixture:
-        small = packed(picture, saturation, put_by, **known)
-        count(np.asarray(small.frames[0].codes))
-        return small
+    class Watched(Packing):
+        def picture(self, saturation: float, put_by: PutBy | None = None) -> Mixture:
+            count(self.codes)
+            return super().picture(saturation, put_by)
 
-    monkeypatch.setattr(light_history, "packed", watched)
-    monkeypatch.setattr(between, "packed", watched)
+    monkeypatch.setattr(packed_pictures, "Packing", Watched)
+    monkeypatch.setattr(between, "Packing", Watched)
     for shown in aligned(plates(), clip.lights, how, first=1001):
         instants += 1
         for plate in shown.plates:

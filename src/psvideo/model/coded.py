@@ -21,8 +21,8 @@ class Tone:
 
     table: what every code that its type can hold becomes first; empty where light is linear in the code. zero, gain:
     (row, col), by position, a pattern that repeats from the picture's top left on: each filter colour of a mosaic may
-    have its own black level. most: codes above this count as it. halves: codes are the bits of half floats, and the
-    table gives these as they are.
+    have its own black level, and each row of what was packed its own range. most: codes above this count as it. halves:
+    codes are the bits of half floats, and the table gives these as they are.
     """
 
     table: Image = field(default_factory=lambda: np.empty(0, np.float32))
@@ -66,11 +66,12 @@ class Coded:
             light = np.asarray(cv2.LUT(np.ascontiguousarray(codes), tone.table), np.float32).reshape(codes.shape)
         else:
             light = np.minimum(codes, tone.most, dtype=np.float32) if tone.most < np.inf else codes.astype(np.float32)
-        first = range(len(self.codes))[rows].start
-        for row, gains in enumerate(tone.gain):
-            for col, gain in enumerate(gains):
-                place = np.s_[(row - first) % len(tone.gain) :: len(tone.gain), col :: len(gains)]
-                light[place] = (light[place] - np.float32(tone.zero[row, col])) * np.float32(gain)
+        places = np.array(range(len(self.codes))[rows], np.intp) % len(tone.gain)
+        zero, gain = (np.asarray(plane[places], np.float32) for plane in (tone.zero, tone.gain))
+        for col in range(gain.shape[1]):
+            own = light[:, col :: gain.shape[1]]
+            off, scale = (plane[:, col].reshape(-1, *(1,) * (own.ndim - 1)) for plane in (zero, gain))
+            own[:] = (own - off) * scale
         return light
 
 

@@ -16,14 +16,13 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats, Image
 from psvideo.model.channels import brightest_channel
 from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, blend_rows
-from psvideo.plates.align.packed import PutBy, packed
+from psvideo.plates.align.packed import BAND_ROWS, Packing, PutBy
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import Reader, mixture_of
+from psvideo.plates.mixing.mixture import Reader
 
 HALF = np.float32(0.5)
-BAND_ROWS = 64
 MARGIN_ROWS = 5
 """Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
 BESIDE_CLIPPED = 5
@@ -69,23 +68,18 @@ def plate_at(
         None if plate is None else _Side.of(plate, motion, max(counts, 1e-6))
         for plate, counts in ((ends.before, 1 - share), (ends.after, share))
     ]
-    image = np.empty(own.shape, np.float32)
-    seen = np.empty((rows, cols), np.bool_)
-
+    packing, seen = Packing.of(own.shape), np.empty((rows, cols), np.bool_)
     sources, columns = (source, source if guess is None else guess), columns_in(cols, source.shape[1])
 
-    def fill(top: int, bottom: int) -> tuple[float, float]:
-        _fill(range(top, bottom), image, seen, own, sides, sources, motion, columns)
-        made_now = image[top:bottom]  # while it lies in a core's cache
-        return float(made_now.min()), float(made_now.max())
+    def fill(top: int, bottom: int) -> None:
+        packing.put(top, _filled(range(top, bottom), seen, own, sides, sources, motion, columns))
 
-    spans = over_ranges(fill, rows, each=BAND_ROWS)
-    span = min(least for least, _ in spans), max(most for _, most in spans)
+    over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
         light=own.light,
         number=number,
         time_s=motion.time_s,
-        picture=packed(mixture_of(image), own.saturation, put_by, span=span),
+        picture=packing.picture(own.saturation, put_by),
         seen=seen,
         saturation=own.saturation,
         brightest_share=own.brightest_share,
@@ -150,26 +144,25 @@ class _Rows:
         return np.where(clipped, np.uint8(CLIPPED), np.uint8(BESIDE) * wider)
 
 
-def _fill(
+def _filled(
     band: range,
-    image: Image,
     seen: Flags,
     own: LightPlate,
     sides: Sequence[_Side | None],
     sources: tuple[Codes8, Codes8],
     motion: Followed,
     columns: tuple[NDArray[np.uintp], Floats],
-) -> None:
+) -> Image:
     """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
-    some, part = slice(band.start, band.stop), _part(sources, band, image.shape)
+    some, part = slice(band.start, band.stop), _part(sources, band, own.shape)
     seen[some] = own.pixels_seen[some]
     if not part:
-        image[some] = own.picture.rows(band)
-        return
+        return own.picture.rows(band)
     rows = [None if side is None else side.around(band, motion.velocity) for side in sides]
     stays = next(one for one in rows if one is not None and one.side.plate is own).of(band)
+    image = np.empty(stays.shape, np.float32)
     for beside in (slice(0, part.start), slice(part.stop, None)):
-        image[some, beside] = stays[:, beside]
+        image[:, beside] = stays[:, beside]
     none, nothing = np.zeros((1, 1, _channels(image)), np.float32), np.zeros((1, 1), np.uint8)
     before, after = (none if one is None else _flat(one.light) for one in rows)
     marks_before, marks_after = (nothing if one is None else one.marks() for one in rows)
@@ -177,14 +170,15 @@ def _fill(
     places, shares = columns
     blend_rows(
         *sources, motion.velocity, np.array([0 if side is None else side.span_s for side in sides], np.float32),
-        image.shape[:2], band.start, part.start, part.stop,
+        (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
         places, shares, np.empty((2, sources[0].shape[1] + 1), np.float32),
         before, after, np.array([0 if one is None else one.first for one in rows], np.intp),
         marks_before, marks_after, seen_before, seen_after,
         np.array([0 if side is None else side.weight for side in sides], np.float32),
         np.array([*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32),
-        np.ascontiguousarray(own.rows_seen[some]), _flat(stays), _flat(image[some]), seen[some],
+        np.ascontiguousarray(own.rows_seen[some]), _flat(stays), _flat(image), seen[some],
     )  # fmt: skip
+    return image
 
 
 def columns_in(cols: int, coarse: int) -> tuple[NDArray[np.uintp], Floats]:

@@ -6,6 +6,7 @@ Frames stay in the codes in which they were read, which several pictures share: 
 beside them. Levels are what is known of the ambient light.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -155,8 +156,8 @@ class Mixture:
             coefficients=np.ascontiguousarray(self.coefficients, np.float32),
             table=first.tone.table,
             halves=all(frame.tone.halves for frame in frames),
-            zero=np.stack([frame.tone.zero for frame in frames]).astype(np.float32),
-            gain=np.stack([frame.tone.gain for frame in frames]).astype(np.float32),
+            zero=_patterns([frame.tone.zero for frame in frames]),
+            gain=_patterns([frame.tone.gain for frame in frames]),
             most=np.float32(min(frame.tone.most for frame in frames)),
             levels=np.array([level.codes.ctypes.data for level in self.levels], np.intp),
             least=_rows_of([level.least for level in self.levels], self.shape[0]),
@@ -200,6 +201,15 @@ def mixture_of(image: Image) -> Mixture:
 def shown_level(level: AmbientLevel) -> Mixture:
     """Return ambient light as a picture."""
     return Mixture(frames=(level.coded,), coefficients=np.ones((1, len(level.codes))), clips_from=np.inf)
+
+
+def _patterns(planes: Sequence[Doubles]) -> Image:
+    """Return patterns that repeat, each (row, col), as (frame, row, col), so large that all of them repeat in it."""
+    if len({plane.shape for plane in planes}) == 1:
+        return np.asarray(np.stack(planes), np.float32)
+    high, wide = (math.lcm(*(plane.shape[axis] for plane in planes)) for axis in range(2))
+    whole = [np.tile(plane, (high // plane.shape[0], wide // plane.shape[1])) for plane in planes]
+    return np.asarray(np.stack(whole), np.float32)
 
 
 def _rows_of(levels: Sequence[Image], rows: int) -> Image:
