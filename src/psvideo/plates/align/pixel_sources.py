@@ -16,8 +16,8 @@ from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.doubt.evenly import EACH_PX, evenly_changed
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
-from psvideo.plates.align.velocity.all_lights import SHADING_PX
 from psvideo.plates.align.velocity.brightness import light_of
+from psvideo.plates.align.velocity.detail import SHADING_PX
 from psvideo.plates.align.velocity.flow import comparable, noise_between, pixel_places
 from psvideo.plates.align.velocity.followed import Followed, Pair, odd_width
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE

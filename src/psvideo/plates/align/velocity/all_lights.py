@@ -14,7 +14,8 @@ import numpy as np
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.correlation import displacements
-from psvideo.plates.align.velocity.flow import FINE_PIXELS, comparable, flow_from, pixel_places
+from psvideo.plates.align.velocity.detail import FINEST_PX, smoothed
+from psvideo.plates.align.velocity.flow import FINE_PIXELS, comparable, detail_in, flow_from, pixel_places
 from psvideo.plates.align.velocity.followed import Pair, mean_over, odd_width
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
@@ -23,12 +24,6 @@ MOST_FLOWS = 4
 STILL_CODES, STILL_LIGHTS, STILL_SHARE, STILL_PX = 3.0, 2, 0.7, 3
 """Pixels that change by fewer codes than the first, under at least two lights and this share of all, are at rest: what
 changes under the other lights is a shadow, or something that passes."""
-FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
-"""Before they are compared, sketches are smoothed by the first, and most of what is wider than the second is removed:
-as surfaces turn, their shading changes, their detail does not."""
-CONTRAST = 10.0
-"""The most contrast of detail, in codes, over such a window; more is scaled down to it: as surfaces turn, the edges
-between them stay in place, but the light on either side changes."""
 FAR = 2
 """Then this many displacements of all changing parts together are tried."""
 COARSE = 2
@@ -52,7 +47,8 @@ class AllLights:
         befores, afters = np.empty((2, len(pairs), *codes[0][0].shape), np.uint8)
 
         def sharpen(light: int, _: int) -> None:
-            befores[light], afters[light] = (_detail(picture) for picture in codes[light])
+            pair, shown = pairs[light], codes[light]
+            befores[light], afters[light] = map(detail_in, (pair.before, pair.after), shown)
 
         over_ranges(sharpen, len(pairs), each=1)
         spans_s = [(time_s - pair.before.time_s, pair.after.time_s - time_s) for pair in pairs]
@@ -116,7 +112,7 @@ class AllLights:
 
     def proposed_far(self) -> list[Floats]:
         """Return velocities of what moved farther than flow reaches by itself."""
-        pairs = (tuple(map(_smoothed, pair)) for pair in self.codes)
+        pairs = (tuple(map(smoothed, pair)) for pair in self.codes)
         found = displacements(pairs, self.codes[0][0].shape, FAR)
         some = _spread(self.count, MOST_FLOWS // FAR)
         constant = [np.empty((2, *self.shape), np.float32) for _ in found]
@@ -143,17 +139,3 @@ class AllLights:
 
 def _spread(count: int, most: int) -> list[int]:
     return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
-
-
-def _smoothed(codes: Codes8) -> Floats:
-    return np.asarray(cv2.GaussianBlur(codes.astype(np.float32), (0, 0), FINEST_PX), np.float32)
-
-
-def _detail(codes: Codes8) -> Codes8:
-    smooth = _smoothed(codes)
-    shading = mean_over(smooth, SHADING_PX)
-    detail = smooth - shading
-    contrast = np.sqrt(np.maximum(mean_over(detail * detail, SHADING_PX), 0))  # sums that run along rows round
-    detail *= np.float32(CONTRAST) / np.maximum(contrast, np.float32(CONTRAST))
-    detail += np.float32(1 - SHADING) * shading
-    return np.asarray(np.clip(detail + np.float32(64.5), 0, 255), np.uint8)

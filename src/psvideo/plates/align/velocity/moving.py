@@ -7,6 +7,7 @@ nothing explains much more than rest does: flow that fits shadows and shading of
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -55,8 +56,8 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     none = np.zeros((2, *lights.shape), np.float32)
     rest = lights.unlike(none)
     wide_rest, fine_rest = lights.mean(rest, WINDOW_PX), lights.mean(rest, FINE_PX)
-    velocity, best = _best(lights, between, wide_rest)
-    fine = lights.mean(lights.unlike(velocity), FINE_PX)
+    chosen = _best(lights, between, wide_rest)
+    velocity, best, fine = chosen.velocity, chosen.wide, lights.mean(chosen.unlike, FINE_PX)
     stirs = lights.stirs()
     moves = _clearly(best, wide_rest, lights.count) & (fine < np.float32(FINE_EXPLAINED) * fine_rest) & stirs
     rested = between.disagree(none, REFUTED_PX)
@@ -69,32 +70,46 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     return Followed(time_s=time_s, velocity=velocity, moves=moves, rests=rests & ~moves, step=lights.step)
 
 
-def _best(lights: AllLights, between: BetweenLights, wide_rest: Floats) -> tuple[Floats, Floats]:
-    """Return, of all proposed velocities, the one for every pixel along which plates are the most alike, and how unlike
-    they are. Far ones are proposed where much of the picture is puzzling; under few lights they must explain clearly
-    more."""
-    velocity, best = _most_alike(lights, lights.proposed())
-    puzzling = np.minimum(best, wide_rest) > PUZZLING * lights.count
-    if np.mean(puzzling & lights.stays(velocity)) > PUZZLED:
-        far, least = _most_alike(lights, lights.proposed_far())
-        better = least < best
+@dataclass(frozen=True, kw_only=True)
+class _Chosen:
+    """The ``velocity`` (2, row, col) of every pixel, how ``unlike`` plates are along it, and so over a ``wide`` window,
+    both (row, col)."""
+
+    velocity: Floats
+    unlike: Floats
+    wide: Floats
+
+    def take(self, other: "_Chosen", where: Flags) -> None:
+        """Take another choice in some pixels."""
+        np.copyto(self.velocity, other.velocity, where=where)
+        np.copyto(self.unlike, other.unlike, where=where)
+        np.copyto(self.wide, other.wide, where=where)
+
+
+def _best(lights: AllLights, between: BetweenLights, wide_rest: Floats) -> _Chosen:
+    """Return, of all proposed velocities, the one for every pixel along which plates are the most alike. Far ones are
+    proposed where much of the picture is puzzling; under few lights they must explain clearly more."""
+    near = _most_alike(lights, lights.proposed())
+    puzzling = np.minimum(near.wide, wide_rest) > PUZZLING * lights.count
+    if np.mean(puzzling & lights.stays(near.velocity)) > PUZZLED:
+        far = _most_alike(lights, lights.proposed_far())
+        better = far.wide < near.wide
         if lights.count <= UNCHECKED:
-            gained = between.disagree(velocity, FARTHER_PX) - between.disagree(far, FARTHER_PX)
+            gained = between.disagree(near.velocity, FARTHER_PX) - between.disagree(far.velocity, FARTHER_PX)
             share = np.where(gained > np.float32(BETTER), np.float32(AGREEING), np.float32(FARTHER))
-            better = lights.mean(least, FARTHER_PX) < share * lights.mean(best, FARTHER_PX)
-        np.copyto(best, least, where=better)
-        np.copyto(velocity, far, where=better)
-    return velocity, best
+            better = lights.mean(far.wide, FARTHER_PX) < share * lights.mean(near.wide, FARTHER_PX)
+        near.take(far, better)
+    return near
 
 
-def _most_alike(lights: AllLights, proposals: Sequence[Floats]) -> tuple[Floats, Floats]:
-    velocity, best = np.zeros((2, *lights.shape), np.float32), np.full(lights.shape, np.inf, np.float32)
-    for proposed in proposals:
-        unlike = lights.mean(lights.unlike(proposed), WINDOW_PX)
-        better = unlike < best
-        np.copyto(best, unlike, where=better)
-        np.copyto(velocity, proposed, where=better)
-    return velocity, best
+def _most_alike(lights: AllLights, proposals: Sequence[Floats]) -> _Chosen:
+    unlike, wide = np.full((2, *lights.shape), np.inf, np.float32)
+    chosen = _Chosen(velocity=np.zeros((2, *lights.shape), np.float32), unlike=unlike, wide=wide)
+    for velocity in proposals:
+        unlike = lights.unlike(velocity)
+        one = _Chosen(velocity=velocity, unlike=unlike, wide=lights.mean(unlike, WINDOW_PX))
+        chosen.take(one, one.wide < chosen.wide)
+    return chosen
 
 
 def _refuted(rested: Floats, moved: Floats) -> Flags:
