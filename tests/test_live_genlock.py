@@ -29,6 +29,7 @@ from psvideo.live.following.genlock import (
     target_of,
 )
 from psvideo.live.following.holding import Holding, trim_by
+from psvideo.live.following.phase_filter import Measured, started
 from psvideo.live.following.trims import Trims
 from psvideo.model.plan import Plan
 from psvideo.runs.on_set.live_strobe import held_strobe
@@ -92,6 +93,52 @@ def test_the_dark_row_is_where_it_is_wanted_after_three_seconds_and_stays(
     assert np.abs(late).max() < HOLDS_ROWS
     assert len(loop.chain.followed) == 1, "the lock is kept through every trim"
     assert -1000 < holding.ppm < -800
+
+
+def errors_and_claims(loop: StrobedLoop) -> tuple[float, float]:
+    """How far, in rows, the newest flash truly is from where the follower has it, and what it claims."""
+    follower, at_s = loop.chain.follower, loop.starts_s[-1]
+    assert follower is not None
+    train = train_between(loop.plan, follower.clock, at_s, at_s)
+    apart_s = train.start_s + 0.5 * train.duration_s - at_s
+    return float(np.abs(apart_s).min()) / loop.plan.camera.row_time_s, follower.error_rows
+
+
+@pytest.mark.parametrize(
+    ("wanted", "offset_ppm", "wander_ppm"), [("20", 900, 30), ("20", -2900, 0), ("edge", 900, 0), ("edge", -900, 30)]
+)
+def test_the_error_of_a_strobe_that_is_held_is_what_is_claimed_of_it(
+    make_plan: PlanMaker, wanted: str, offset_ppm: float, wander_ppm: float
+) -> None:
+    """At the edge no row shows the flashes, which may lie anywhere between two frames."""
+
+    def clock_ppm(at_s: float) -> float:
+        return offset_ppm + wander_ppm * math.sin(at_s / 7)
+
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=clock_ppm, jitter_s=1e-6, seed=3)
+    lock(loop)
+    holding = holding_of(loop, wanted)
+    began_s = loop.host_s
+    both = np.array([errors_and_claims(loop) for at_s in loop.film(12.0, holding) if at_s > began_s + 3.0])
+    assert np.sqrt(((both[:, 0] / both[:, 1]) ** 2).mean()) < 2.0
+    assert np.median(both[:, 1]) < (0.02 if wanted == "20" else 1.0), "and what is claimed is little"
+
+
+@pytest.mark.parametrize("trimmed_s", [0.0, 3.24, -3.24])
+def test_a_clock_turns_about_the_moment_that_was_measured_however_far_it_was_trimmed(trimmed_s: float) -> None:
+    """An hour of 900 ppm is three seconds, and a rate that is put right by 5 ppm about another moment 16 us."""
+    at_s, late_s = 3600.0, 1e-5
+    clock = FoundClock(phase_s=0.0, offset_ppm=0.0, knot_s=(0.0, at_s), bend_s=(0.0, trimmed_s))
+    shift = started(clock, at_s, 1e-5, 50.0).corrected(Measured(at_s=at_s + 1.0, late_s=late_s, error_s=1e-7))
+
+    def comes_s(one: FoundClock, unbent_s: float) -> float:
+        strobe_s = (unbent_s - one.phase_s) / one.rate
+        return one.phase_s + strobe_s * one.rate + float(one.bend(np.array([unbent_s]))[0])
+
+    unbent_s = clock.unbent_s(at_s + 1.0)
+    strobe_s = (unbent_s - clock.phase_s) / clock.rate
+    later_s = comes_s(shift.clock, shift.clock.phase_s + strobe_s * shift.clock.rate) - (at_s + 1.0)
+    assert later_s == pytest.approx(late_s, rel=0.05)
 
 
 def test_the_boards_firmware_is_filmed_followed_trimmed_and_dark_once_its_host_is_silent(

@@ -5,6 +5,7 @@ the strobe says: ``frame_places``.
 ``catching_up`` follows it up to the newest frame, from the one on in which it is seen (``first_shown``). ``follow``
 keeps it frame by frame, on a ``window`` of profiles: ``foretold`` holds what came against what was to come,
 ``seen_share`` judges whether it is the strobe, ``lateness`` measures by how much it is late, ``phase_filter`` makes a
-clock of that, and ``trims`` are what it was told to do. ``history`` is its timing afterwards, and ``light_names`` says
-how the lights' names are known. ``genlock`` and ``holding`` go the other way: they trim the strobe to the camera.
+clock of that, and ``trims`` are what it was told to do; ``between_frames`` says where no row shows it. ``history`` is
+its timing afterwards, and ``light_names`` says how the lights' names are known. ``genlock`` and ``holding`` go the
+other way: they trim the strobe to the camera.
 """

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from psvideo.live.following.between_frames import unseen_s
 from psvideo.live.following.foretold import Learnt, learnt_from
 from psvideo.live.following.frame_places import FramePlaces
 from psvideo.live.following.lateness import late_by
@@ -38,13 +39,17 @@ ASTRAY, LEAST_ASTRAY_ROWS = 8.0, 0.1
 started again. Where frames are missing it stands within 2 errors, else hardly ever within 15."""
 
 
+UNIFORM = 12.0**-0.5
+"""The standard deviation of what may be anywhere in a stretch, as a share of its length."""
+
+
 @dataclass(kw_only=True)
 class Follower:
     """Follows one lock. ``places`` says where its frames stand in time.
 
-    ``measured`` is what windows of frames said of the clock, against the lock's own, ``span`` the places in time of the
-    first and the last frame that were followed; ``doubted_from`` is the place from which it is not known whether they
-    show this strobe, None while it is locked.
+    ``measured`` is what windows of frames said of the clock, against the lock's own and at untrimmed times; ``span``
+    the places in time of the first and the last frame that were followed; ``doubted_from`` is the place from which it
+    is not known whether they show this strobe, None while it is locked.
     """
 
     plan: Plan
@@ -71,9 +76,11 @@ class Follower:
 
     @property
     def error_rows(self) -> float:
-        """The standard error of the flashes' times at the latest frame, in rows."""
+        """The standard error of the flashes' times at the latest frame, in rows; of a strobe that is held where no row
+        shows its flashes, they may be anywhere in between."""
         at_s = self.phase.at_s if self.span is None else self.span[1] * self.window.period_s
-        return self.phase.error_at_s(at_s) / self._row_s
+        anywhere_s = unseen_s(self.plan, self.lock.camera, self.clock, at_s) if self.trims.at_s else 0.0
+        return float(np.hypot(self.phase.error_at_s(at_s), anywhere_s * UNIFORM)) / self._row_s
 
     @property
     def _row_s(self) -> float:
@@ -176,8 +183,11 @@ class Follower:
         if self.state == "locked":
             at_s = float(rows.frame_start_s.mean())
             shift_s, error_s = late_by(self.plan, rows, beat, rest)
-            one = Measured(at_s=at_s, late_s=shift_s, error_s=error_s * float(np.sqrt(len(rows.value) / new)))
-            self.measured.append(replace(one, late_s=self._late_s(at_s) + shift_s))
+            trims_s = self.trims.doubt_s(self.trims.untrimmed_s(float(rows.frame_start_s[0])))
+            error_s = float(np.hypot(error_s, trims_s) * np.sqrt(len(rows.value) / new))
+            one = Measured(at_s=at_s, late_s=shift_s, error_s=error_s)
+            untrimmed_s = self.trims.untrimmed_s(at_s)
+            self.measured.append(replace(one, at_s=untrimmed_s, late_s=self._late_s(untrimmed_s) + shift_s))
             self.phase = self.phase.corrected(one)
         self._learn(rows)
 
@@ -233,11 +243,12 @@ class Follower:
         frames = rows.take(slice(len(rows.value) - known, len(rows.value))).one_window()
         self._learnt = learnt_from(self.plan, frames, self._beat_now)
 
-    def _late_s(self, at_s: float) -> float:
-        """Return by how much flashes come later at a time than the lock's own clock says, trims left aside."""
+    def _late_s(self, untrimmed_s: float) -> float:
+        """Return by how much a flash comes later than the lock's own clock has it, trims left aside; the time is the
+        one at which it would come without any trim."""
         base, now = self.lock.beat.clock, self.clock
-        strobe_s = (at_s - base.phase_s) / base.rate
-        return now.phase_s + strobe_s * now.rate - at_s
+        strobe_s = (untrimmed_s - base.phase_s) / base.rate
+        return now.phase_s + strobe_s * now.rate - untrimmed_s
 
 
 def following(plan: Plan, lock: Lock) -> Follower:

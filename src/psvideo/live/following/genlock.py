@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.errors import UsageError
+from psvideo.live.following.between_frames import flash_place
 from psvideo.live.following.follow import Follower
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan
 from psvideo.strobe.link.boards import MAX_TRIM_PPM
-from psvideo.sync.rowfit.beat import train_between
 
 PULL_S = 0.25
 """The dark row's distance shrinks to a third in this time: slower than the clock is measured (every 8 frames)."""
@@ -113,17 +113,11 @@ class DarkRow:
 def dark_row(follower: Follower, at_s: float) -> DarkRow:
     """Return the dark row at a time: the middle of a flash, seen by rows as they open and close."""
     plan, camera = follower.plan, follower.lock.camera
-    period_s = camera.frame_period_s
-    clock = follower.clock
-    train = train_between(plan, clock, at_s, at_s)
-    near = np.abs(train.start_s - at_s) < plan.cycle_s
-    middle_s = train.start_s[near] + 0.5 * train.duration_s[near] + 0.5 * (period_s - camera.exposure_s)
-    turn = np.exp(2j * np.pi * middle_s / period_s).mean()
     step_s = plan.cycle_s / len(plan.cycle_slots)
-    rate = clock.rate + 1e-6 * follower.trims.now_ppm
-    frames = max(round(step_s / period_s), 1)
-    phase = float(np.angle(turn)) / (2 * np.pi) % 1.0
-    return DarkRow(row=phase * rows_around(camera), slip_ppm=1e6 * (step_s * rate / (frames * period_s) - 1))
+    rate = follower.clock.rate + 1e-6 * follower.trims.now_ppm
+    frames = max(round(step_s / camera.frame_period_s), 1)
+    row = flash_place(plan, camera, follower.clock, at_s) * rows_around(camera)
+    return DarkRow(row=row, slip_ppm=1e6 * (step_s * rate / (frames * camera.frame_period_s) - 1))
 
 
 def next_trim_ppm(now_ppm: int, seen: DarkRow, target: WantedRow, camera: Camera) -> int:

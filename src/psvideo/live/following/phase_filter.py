@@ -17,6 +17,9 @@ from psvideo.sync.rowfit.beat import FoundClock
 
 WANDER_PPM = 1.0
 """By how much a rate may wander in a second (as the root of the seconds), beside its drift."""
+HELD_WANDER_PPM = 5.0
+"""The same of a strobe that is trimmed, of which no drift is estimated: 5 ppm a second of drift, or 30 ppm that wander
+in 20 s, are followed within 2 errors; with 1 they were off by 5 to 13."""
 DRIFT_PPM_PER_S = 5.0
 """How fast a rate may drift when it is found: of a board on a ceramic resonator, just switched on."""
 DRIFT_WANDERS = 1.0
@@ -46,26 +49,28 @@ class Measured:
 @dataclass(frozen=True, kw_only=True)
 class PhaseFilter:
     """The clock as it is known at ``at_s``, its drift, and the covariance (3, 3) of its shift (us), its rate (ppm) and
-    its drift (ppm/s). ``drift_wanders``: by how much the drift may change, as ``DRIFT_WANDERS``."""
+    its drift (ppm/s). ``wander_ppm`` and ``drift_wanders``: by how much rate and drift may change, as ``WANDER_PPM``
+    and ``DRIFT_WANDERS``."""
 
     clock: FoundClock
     at_s: float
     covariance: Doubles
     drift_ppm_per_s: float = 0.0
+    wander_ppm: float = WANDER_PPM
     drift_wanders: float = DRIFT_WANDERS
 
     def error_at_s(self, at_s: float) -> float:
         """Return the standard error of the phase, in seconds, at any time."""
-        return float(np.sqrt(_grown(self.covariance, at_s - self.at_s, self.drift_wanders)[0, 0])) / US
+        return float(np.sqrt(self._grown(at_s - self.at_s)[0, 0])) / US
 
     def corrected(self, measured: Measured) -> "PhaseFilter":
         """Return the filter after a window; its ``late_s`` is against this filter's own clock."""
         step_s = measured.at_s - self.at_s
-        before = _grown(self.covariance, step_s, self.drift_wanders)
+        before = self._grown(step_s)
         drifted_us, drifted_ppm, drift = _forward(step_s) @ [0.0, 0.0, self.drift_ppm_per_s]
         gain = before[:, 0] / (before[0, 0] + measured.variance)
         late_us, ppm, drift = gain * (measured.late_s * US - drifted_us) + [drifted_us, drifted_ppm, drift]
-        clock = self.clock.shifted(float(late_us) / US, float(ppm), pivot_s=measured.at_s)
+        clock = self.clock.shifted(float(late_us) / US, float(ppm), pivot_s=self.clock.unbent_s(measured.at_s))
         covariance = before - np.outer(gain, before[0])
         return replace(self, clock=clock, at_s=measured.at_s, covariance=covariance, drift_ppm_per_s=float(drift))
 
@@ -74,9 +79,12 @@ class PhaseFilter:
         return replace(self, covariance=self.covariance + np.diag([(error_s * US) ** 2, 0.0, 0.0]))
 
     def without_drift(self) -> "PhaseFilter":
-        """Return the filter of a clock whose rate only wanders: what it took for a drift is forgotten."""
+        """Return the filter of a clock whose rate only wanders, more: what it took for a drift is forgotten."""
         covariance = self.covariance * np.outer([1.0, 1.0, 0.0], [1.0, 1.0, 0.0])
-        return replace(self, covariance=covariance, drift_ppm_per_s=0.0, drift_wanders=0.0)
+        return replace(self, covariance=covariance, drift_ppm_per_s=0.0, wander_ppm=HELD_WANDER_PPM, drift_wanders=0.0)
+
+    def _grown(self, step_s: float) -> Doubles:
+        return _grown(self.covariance, step_s, self.wander_ppm, self.drift_wanders)
 
 
 def started(clock: FoundClock, at_s: float, error_s: float, error_ppm: float) -> PhaseFilter:
@@ -92,7 +100,7 @@ def smoothed(points: Sequence[Measured]) -> Doubles:
     states, kept, ahead = [state], [covariance], []
     for before, point in pairwise(points):
         step_s = point.at_s - before.at_s
-        guess, grown = _forward(step_s) @ state, _grown(covariance, step_s, DRIFT_WANDERS)
+        guess, grown = _forward(step_s) @ state, _grown(covariance, step_s, WANDER_PPM, DRIFT_WANDERS)
         gain = grown[:, 0] / (grown[0, 0] + point.variance)
         state, covariance = guess + gain * (point.late_s * US - guess[0]), grown - np.outer(gain, grown[0])
         states.append(state)
@@ -112,11 +120,11 @@ def _forward(step_s: float) -> Doubles:
     return np.array([[1.0, step_s, 0.5 * step_s**2], [0.0, 1.0, step_s], [0.0, 0.0, 1.0]])
 
 
-def _grown(covariance: Doubles, step_s: float, drift_wanders: float) -> Doubles:
+def _grown(covariance: Doubles, step_s: float, wander_ppm: float, drift_wanders: float) -> Doubles:
     """Return what is known after a time without measurements, before or after: rate and drift wander meanwhile."""
     forward, t = _forward(step_s), step_s
     rate = np.array([[t**2 / 3, t / 2, 0.0], [t / 2, 1.0, 0.0], [0.0, 0.0, 0.0]])
     drift = np.array([[t**4 / 20, t**3 / 8, t**2 / 6], [t**3 / 8, t**2 / 3, t / 2], [t**2 / 6, t / 2, 1.0]])
-    noise = abs(t) * (WANDER_PPM**2 * rate + drift_wanders**2 * drift)
+    noise = abs(t) * (wander_ppm**2 * rate + drift_wanders**2 * drift)
     grown: Doubles = forward @ covariance @ forward.T + noise
     return grown

@@ -10,7 +10,8 @@ from psvideo.model.arrays import Doubles
 from psvideo.sync.rowfit.beat import FoundClock
 
 LATENCY_S = 0.02
-"""A trim's moment is known no better than this on the camera's clock: frames take their time to come."""
+"""A trim's moment is known no better than this on the camera's clock: frames take their time to come, and a trim counts
+from a board's next step or the one after it."""
 SETTLED = 4
 """Looks at a time without trims until it stands still: each leaves a 100th of what the one before did."""
 TAIL_S = 1.0
@@ -57,6 +58,14 @@ class Trims:
     def _late_at_s(self, time_s: float) -> float:
         last = bisect_right(self.at_s, time_s) - 1
         return 0.0 if last < 0 else self._late_s[last] + 1e-6 * self.ppm[last] * (time_s - self.at_s[last])
+
+    def doubt_s(self, since_s: float) -> float:
+        """Return by how much flashes may come otherwise than foreseen for the moments of trims since an untrimmed time:
+        all may be wrong alike."""
+        first = bisect_left(self.at_s, since_s)
+        before = [0.0, *self.ppm][first]
+        changes_ppm = np.diff([before, *self.ppm[first:]])
+        return 1e-6 * float(np.abs(changes_ppm).sum()) * LATENCY_S
 
     def bent(self, clock: FoundClock, *, since_s: float) -> FoundClock:
         """Return a clock with the bends of all trims; those of trims that ended before a time of the camera are one

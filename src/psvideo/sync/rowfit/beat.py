@@ -30,7 +30,8 @@ class FoundClock:
         return 1.0 + self.offset_ppm * 1e-6
 
     def shifted(self, shift_s: float, ppm: float, *, pivot_s: float) -> "FoundClock":
-        """Return this clock moved by ``shift_s`` and its periods made longer by ``ppm``, turning about ``pivot_s``."""
+        """Return this clock moved by ``shift_s`` and its periods made longer by ``ppm``, turning about
+        ``pivot_s``, a time on the unbent clock."""
         phase_s = self.phase_s + shift_s + (self.phase_s - pivot_s) * ppm * 1e-6
         offset_ppm = self.offset_ppm + ppm * self.rate
         return FoundClock(phase_s=phase_s, offset_ppm=offset_ppm, knot_s=self.knot_s, bend_s=self.bend_s)
