@@ -25,6 +25,7 @@ from psvideo.live.incoming.source import played_clip
 from psvideo.live.status import LiveStatus
 from psvideo.model.coded import Coded
 from psvideo.runs.live import live
+from psvideo.runs.steps.caller import PYTHON
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,10 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_normals_of_the_recording_are_those_of_the_clip(clip: Path, tmp_path: Path) -> None:
     shutil.copytree(clip, tmp_path / "holed")
     (tmp_path / "holed" / "frames" / sorted(path.name for path in (clip / "frames").iterdir())[70]).unlink()
-    summary = live(tmp_path / "holed", record=tmp_path / "rec", pace="fastest")
+    said: list[str] = []
+    summary = live(tmp_path / "holed", record=tmp_path / "rec", pace="fastest", caller=replace(PYTHON, say=said.append))
+    assert said[0] == f"The lights stand where {tmp_path / 'holed' / 'rig.toml'} says."
+    assert ps.read_rig(tmp_path / "rec" / "rig.toml") == ps.read_rig(clip / "rig.toml")
     assert (summary.recorded, summary.lost) == (109, 1)
     takes = [ps.open_take(path) for path in (tmp_path / "holed", tmp_path / "rec")]
     assert takes[1].clip.dropped[0][1] == 1
@@ -131,7 +135,7 @@ def test_the_log_of_a_strobe_that_was_played_meanwhile_lies_in_the_recording(cli
     source = played_clip(open_clip(clip), pace="fastest")
     with recording.recording(tmp_path / "rec", source, force=False) as record:
         record.take(next(source.frames()))
-        record.log = "what was played"
+        record.beside["strobe.json"] = "what was played"
     assert (tmp_path / "rec" / "strobe.json").read_text(encoding="utf-8") == "what was played"
 
 
@@ -249,7 +253,7 @@ def test_a_log_that_finds_no_room_costs_no_recording(
 
     with recording.recording(tmp_path / "rec", source, force=False) as record:
         record.take(next(source.frames()))
-        record.log = "what was played"
+        record.beside["strobe.json"] = "what was played"
         monkeypatch.setattr(Path, "write_text", full)
     monkeypatch.undo()
     assert len(ps.open_take(tmp_path / "rec").numbers) == 1

@@ -39,9 +39,15 @@ def rig_of_take(rig: Path | str | None, clip: Path) -> Path:
     raise UsageError(f"`rig` {path}: holds no rig for {clip}; expected {name}.toml. {_advice(path, name)}")
 
 
-def _beside(clip: Path) -> Path:
+def rig_beside(clip: Path) -> Path | None:
+    """Return the rig that lies in a clip's folder, or beside a movie; None where there is none."""
     path = (clip if clip.is_dir() else clip.parent) / RIG_FILE
-    if not path.is_file():
+    return path if path.is_file() else None
+
+
+def _beside(clip: Path) -> Path:
+    path = rig_beside(clip)
+    if path is None:
         raise UsageError(
             f"{clip}: there is no {RIG_FILE} {'here' if clip.is_dir() else 'beside it'}, the file that says where the "
             "lights are. psvideo calibrate mirror-sphere measures them on a chrome ball: put its rig beside the "

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from psvideo.errors import NoStrobeError, said_of
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.rig_folder import RIG_FILE, rig_beside
+from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import check_can_be_written, refuse_existing, write_text
@@ -33,7 +34,7 @@ from psvideo.runs.on_set.live_strobe import held_strobe
 from psvideo.runs.on_set.live_viewed import PageAddress, check_gives_normals, rig_keeper, viewed
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.strobe.link.ports import AUTO
-from psvideo.strobe.runlog import RunLog, format_log
+from psvideo.strobe.runlog import LOG_NAME, RunLog, format_log
 
 
 def live(
@@ -68,7 +69,8 @@ def live(
       input. ``plan`` names the plan where it does not lie beside it.
     - ``growing``: the source is a folder that a recorder is writing. ``raw``: FFmpeg's name of the pixels that bare
       bytes hold, such as gray or gray16le.
-    - ``rig``: where the lights are; without it there are plates and no normals.
+    - ``rig``: where the lights are. Left out, the rig.toml beside the source's footage; where there is none, there are
+      plates and no normals.
     - ``rig_out``: a rig.toml to write when lights are found on a chrome ball, by a click on the page.
     - ``timing_out``: a timing.json to write at the end, of all that was followed, by the recording's name and numbers
       where one was made; ``force`` replaces one.
@@ -97,14 +99,11 @@ def live(
     check_followed(played.plan)
     check_separable(played.plan)
     check_first_light(played.plan, first_light)
-    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=played.plan.lights)
+    known = _rig(rig, source, played, caller)
     timing_path = path_if_given("timing_out", timing_out)
     if timing_path is not None:
         refuse_existing(timing_path, force=force, mark=TIMING)
         check_can_be_written(timing_path)
-    if known is not None:
-        with said_of(rig):
-            check_gives_normals(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
     running.prepare = lambda: rehearse(played, known, step=running.chain.step, page=page)
     kept = rig_keeper(path_if_given("rig_out", rig_out), force=force)
@@ -114,7 +113,7 @@ def live(
 
     def logged(log: RunLog) -> None:
         if running.recording is not None:
-            running.recording.log = format_log(log)
+            running.recording.beside[LOG_NAME] = format_log(log)
 
     held = partial(
         held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller, logged=logged
@@ -127,6 +126,8 @@ def live(
     ):
         running.holding = holding
         running.recording = recorded
+        if recorded is not None and known is not None:
+            recorded.beside[RIG_FILE] = format_rig(known)
         summary = running.run()
     if recorded is not None:
         summary = replace(summary, recorded=recorded.written, notes=running.all_notes)
@@ -134,6 +135,24 @@ def live(
     if timing_path is not None:
         write_text(timing_path, format_timing(_timing(running, record_path)))
     return summary
+
+
+def _rig(named: Path | str | None, source: Path | str, played: LiveSource, caller: Caller) -> Rig | None:
+    """Return the rig that was named, or the one beside the footage, which is said; None where there is none.
+
+    Raises PsvideoError where it gives no normals.
+    """
+    footage = Path(source)
+    beside = rig_beside(footage) if footage.exists() else None
+    path = beside if named is None else path_of("rig", named)
+    if path is None:
+        return None
+    if named is None:
+        caller.say(f"The lights stand where {path} says.")
+    known = read_rig(path, plan_lights=played.plan.lights)
+    with said_of(path):
+        check_gives_normals(known, played)
+    return known
 
 
 def _check_found(running: Running, record_path: Path | None) -> None:

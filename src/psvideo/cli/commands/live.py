@@ -41,7 +41,7 @@ def live(
     ] = "",
     plan: PlanPath = None,
     rig: Annotated[
-        Path | None, typer.Option("--rig", help="Where the lights are; left out: plates alone, no normals.")
+        Path | None, typer.Option("--rig", help="Where the lights are; left out: rig.toml beside the footage.")
     ] = None,
     rig_out: Annotated[
         Path | None, typer.Option("--rig-out", help="Rig file for the lights that a click on the page finds on a ball.")

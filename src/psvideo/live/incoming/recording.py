@@ -38,7 +38,8 @@ NO_ROOM = "the disk takes no more"
 class Recording:
     """Takes frames and writes them beside. ``written`` counts them; ``ended`` says why recording ended early.
 
-    ``log`` is what the strobe's log is to say, where the strobe was played meanwhile; "": what lies beside the plan.
+    ``beside`` holds texts to write beside the frames at the end, by file name: the rig that is in use, and the log of
+    a strobe that was played meanwhile, in place of the one that lies beside the plan.
     ``waits``: a frame waits for room, as of a clip that is played as fast as it goes; else recording ends.
     """
 
@@ -46,7 +47,7 @@ class Recording:
     waits: bool = False
     written: int = 0
     ended: str = ""
-    log: str = ""
+    beside: dict[str, str] = field(default_factory=dict)
     most_bytes: int = MOST_WAITING_BYTES
     _queue: deque[tuple[int, NDArray[Any]]] = field(default_factory=deque)
     _bytes: int = 0
@@ -121,10 +122,10 @@ class Recording:
 def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Recording]:
     """Give what records a source into a clip folder; when the block ends, the folder appears under its name.
 
-    The plan lies in it as it lay before, and the strobe's log: the recording's own, or the one beside the plan. A block
-    that fails raises what it raised once the frames until then are whole, with a sentence that says so. Raises
-    UsageError where the folder exists, where a recording that was killed left frames beside it, or the source's frames
-    are not plain codes, and PsvideoError where not one frame was recorded.
+    The plan lies in it as it lay before, the strobe's log (the recording's own, or the one beside the plan), and the
+    rig in use. A block that fails raises what it raised once the frames until then are whole, with a sentence that says
+    so. Raises UsageError where the folder exists, where a recording that was killed left frames beside it, or the
+    source's frames are not plain codes, and PsvideoError where not one frame was recorded.
     """
     if source.plan_path is None:
         raise UsageError(
@@ -146,7 +147,7 @@ def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Record
             failed = _ended(record, writer, failed)
             if not record.written:
                 raise failed or PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())
-            _write_log(folder, record)
+            _write_beside(folder, record)
     except BaseException:
         if record is not None and not record.written:
             forget_begun(path)
@@ -180,15 +181,14 @@ def _ended(record: Recording, writer: threading.Thread, failed: BaseException | 
     return failed
 
 
-def _write_log(folder: Path, record: Recording) -> None:
-    """Write what the strobe played, where it played: a disk that is full costs the log, and not the recording."""
-    if not record.log:
-        return
-    try:
-        (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
-    except OSError as fault:
-        (folder / LOG_NAME).unlink(missing_ok=True)
-        record.ended = f"{record.ended} {LOG_NAME} could not be written ({fault.strerror}).".strip()
+def _write_beside(folder: Path, record: Recording) -> None:
+    """Write the texts beside the frames: a disk that is full costs them, and not the recording."""
+    for name, text in record.beside.items():
+        try:
+            (folder / name).write_text(text, encoding="utf-8")
+        except OSError as fault:
+            (folder / name).unlink(missing_ok=True)
+            record.ended = f"{record.ended} {name} could not be written ({fault.strerror}).".strip()
 
 
 def recorded_words(path: Path, record: Recording) -> str:

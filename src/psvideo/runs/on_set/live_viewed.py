@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import SCHEMA as RIG
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
@@ -97,7 +98,9 @@ def viewed(
 
 
 def _used(found: Rig, running: Running, watching: Watching, kept: Kept) -> str:
-    """Use a rig that was found from now on, and keep it; return what became of it."""
+    """Use a rig that was found from now on, record it beside the frames, and keep it; return what became of it."""
     check_gives_normals(found, running.source)
     running.chain.rig = watching.rig = found
+    if running.recording is not None:
+        running.recording.beside[RIG_FILE] = format_rig(found)
     return kept(found)
