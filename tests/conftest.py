@@ -6,14 +6,16 @@ Nothing here imports Playwright: tests that open no browser run without it.
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from psvideo.model.camera import Camera
+from psvideo.formats.plan_toml import format_plan
+from psvideo.model.camera import Camera, Encoding
 from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
 from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.link.protocol import format_request
@@ -101,6 +103,19 @@ def _make_plan(
         dark_every=dark_every,
         clock_tolerance_ppm=clock_tolerance_ppm,
     )
+
+
+@pytest.fixture
+def written_plan(tmp_path: Path, make_plan: Callable[..., Plan]) -> Callable[..., Path]:
+    """Return what writes a plan whose frames have a size, a rate and an encoding, and gives its path."""
+
+    def write(*, rows: int, cols: int, fps: Fraction = Fraction(120000, 1001), **encoding: Any) -> Path:
+        plan = make_plan(width_px=cols, height_px=rows, fps=fps)
+        camera = replace(plan.camera, encoding=Encoding(**encoding))
+        (tmp_path / "plan.toml").write_text(format_plan(replace(plan, camera=camera)))
+        return tmp_path / "plan.toml"
+
+    return write
 
 
 @pytest.fixture(scope="session")
