@@ -187,6 +187,27 @@ def _see_sharp(frame_start_s: Doubles, offset_s: float, exposure_s: float, flash
             j += 1
 
 
+@EXACT.called
+def _share(open_s: float, close_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float) -> float:
+    """Return the share of a flash that is given off between two times since its start."""
+    after, _ = given_off(close_s, duration_s, rise_s, fall_s, blur_s)
+    before, _ = given_off(open_s, duration_s, rise_s, fall_s, blur_s)
+    return after - before
+
+
+@EXACT.called
+def _add_tail_slopes(
+    flashes: Flashes, d: float, open_s: float, close_s: float, seen: float, light: float, probe_s: float,
+    signals: Doubles,
+) -> None:  # fmt: skip
+    """Add how a flash's light changes with its tails: the difference to tails that are ``probe_s`` longer."""
+    rise_s, fall_s, blur_s = flashes.rise_s, flashes.fall_s, flashes.blur_s
+    signals[RISE] += light * (_share(open_s, close_s, d, rise_s + probe_s, fall_s, blur_s) - seen) / probe_s
+    signals[FALL] += light * (_share(open_s, close_s, d, rise_s, fall_s + probe_s, blur_s) - seen) / probe_s
+    if blur_s > 0.0:
+        signals[BLUR] += light * (_share(open_s, close_s, d, rise_s, fall_s, blur_s + probe_s) - seen) / probe_s
+
+
 @EXACT.kept
 def slopes(
     rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: Doubles, tails: bool, signals: Doubles
@@ -206,28 +227,18 @@ def slopes(
         j -= 1
     closing = opening = 0.0
     while j < len(flashes.start_s) and flashes.start_s[j] - near_s < close_s:
-        u = flashes.unknown[j]
-        if u > 0:
-            d = flashes.duration_s[j]
-            since_close, since_open = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
-            if since_open <= -before_s and since_close >= d + over_s:  # wholly seen, however it is moved a little
-                j += 1
-                continue
-            after, after_rate = given_off(since_close, d, rise_s, fall_s, blur_s)
-            before, before_rate = given_off(since_open, d, rise_s, fall_s, blur_s)
+        u, d = flashes.unknown[j], flashes.duration_s[j]
+        since_close_s, since_open_s = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
+        is_whole = since_open_s <= -before_s and since_close_s >= d + over_s  # however it is moved a little
+        if u > 0 and not is_whole:
+            after, after_rate = given_off(since_close_s, d, rise_s, fall_s, blur_s)
+            before, before_rate = given_off(since_open_s, d, rise_s, fall_s, blur_s)
             closing += brightness[u] * after_rate
             opening += brightness[u] * before_rate
             if tails:
-                a, _ = given_off(since_close, d, rise_s + probe_s, fall_s, blur_s)
-                b, _ = given_off(since_open, d, rise_s + probe_s, fall_s, blur_s)
-                signals[RISE] += brightness[u] * (a - b - after + before) / probe_s
-                a, _ = given_off(since_close, d, rise_s, fall_s + probe_s, blur_s)
-                b, _ = given_off(since_open, d, rise_s, fall_s + probe_s, blur_s)
-                signals[FALL] += brightness[u] * (a - b - after + before) / probe_s
-                if blur_s > 0.0:
-                    a, _ = given_off(since_close, d, rise_s, fall_s, blur_s + probe_s)
-                    b, _ = given_off(since_open, d, rise_s, fall_s, blur_s + probe_s)
-                    signals[BLUR] += brightness[u] * (a - b - after + before) / probe_s
+                _add_tail_slopes(
+                    flashes, d, since_open_s, since_close_s, after - before, brightness[u], probe_s, signals
+                )
         j += 1
     signals[EXPOSURE] = closing
     signals[ROW_TIME] = (closing - opening) * rows.row_place[row]
@@ -239,12 +250,9 @@ def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float
     """Return the share of flash ``j`` that a row saw in a frame, 0 for a dark slot."""
     if flashes.unknown[j] == 0:
         return 0.0
-    since_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s - flashes.start_s[j]
-    after, _ = given_off(
-        since_s + rows.exposure_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s
-    )
-    before, _ = given_off(since_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s)
-    return after - before
+    open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s - flashes.start_s[j]
+    close_s = open_s + rows.exposure_s
+    return _share(open_s, close_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s)
 
 
 @EXACT.kept

@@ -55,36 +55,40 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
     if len(rows.window_start) < LEAST_WINDOWS:
         return fit
     knots = _knots(rows)
-    beat, rest, weight = fit.beat, fit.rest, fit.weight
-    strength = 0.0
     basis = _basis(len(knots.at_s), free)
+    was_bent = bool(fit.beat.clock.knot_s)
+    beat, rest = fit.beat, fit.rest
     for step in range(steps):
-        scale = errors_of_residuals(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
+        scale = errors_of_residuals(rows, rest, 0.02 if step == 0 and was_bent else 0.0)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
         rest, hessian, scores, _ = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
         inflation = _inflation(hessian, scores, rows)
-        strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
-        if gain < CLEARLY and not fit.beat.clock.knot_s:
+        pull = scores.sum(axis=0)
+        strength, gain = _wandering(hessian / inflation, pull / inflation, beat, knots)
+        if gain < CLEARLY and not was_bent:
             return fit
         known = known_of_bends(hessian, knots, strength, inflation)
         now = np.append(beat.clock.bend(knots.at_s), np.zeros(len(free)))
-        move = np.linalg.solve(hessian + known, scores.sum(axis=0) - known @ now)
-        beat = _moved(rows, beat, knots, free, move)
-    rest = unexplained(plan, rows, beat, weight)
-    bread = np.linalg.inv(hessian + known)
+        beat = _moved(rows, beat, knots, free, np.linalg.solve(hessian + known, pull - known @ now))
     covariance, alike_s = believable(plan, rows, beat, weight, trust, basis, known)
-    covariance = covariance + bread @ known @ bread
-    size = len(knots.at_s)
+    posterior = np.linalg.inv(hessian + known)
+    covariance = covariance + posterior @ known @ posterior
+    return _bent_fit(replace(fit, beat=beat, weight=weight, alike_s=alike_s), plan, rows, basis, covariance, free)
+
+
+def _bent_fit(
+    fit: Fit, plan: Plan, rows: Profiles, basis: Doubles, covariance: Doubles, free: tuple[str, ...]
+) -> Fit:  # fmt: skip
+    """Return a fit with what its beat leaves, and the errors of its shift and of the times named in ``free``."""
+    rest = unexplained(plan, rows, fit.beat, fit.weight)
+    knots = len(covariance) - len(free)
     return replace(
         fit,
-        beat=beat,
         rest=rest,
-        weight=weight,
-        shift_error_s=mean_error(basis[:size], covariance),
-        errors_s={name: standard_error_of(covariance[size + n, size + n]) for n, name in enumerate(free)},
+        shift_error_s=mean_error(basis[:knots], covariance),
+        errors_s={name: standard_error_of(covariance[knots + n, knots + n]) for n, name in enumerate(free)},
         explained=explained(rows, rest),
-        alike_s=alike_s,
     )
 
 
