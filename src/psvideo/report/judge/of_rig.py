@@ -54,7 +54,7 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     if weaker:
         yield _beside_weaker(weaker)
     elif fit is not None:
-        yield rig_explains(fit)
+        yield rig_explains(fit, lights=int(observed.firing.sum()))
     elif observed.slopes:
         yield Judgement(
             subject="rig",

@@ -34,8 +34,8 @@ MOVING_FACTOR = 2.0
 """Where the picture moves, this many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
-NONE_VALID = 0.02
-"""With less, what is good for a look is all that is left."""
+NONE_VALID = 0.05
+"""With less, what is good for a look is all that is left, whatever is to blame: no take to be used."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -97,7 +97,8 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
         if beyond_deg is None
         else max(COMMON_DEG, by_noise_deg(observed.facts)) < beyond_deg <= LOST_DEG
     )
-    grade: Grade = "bad" if max(shares) < HARDLY_VALID and not by_surface else "doubtful"
+    lost = max(shares) < NONE_VALID or (max(shares) < HARDLY_VALID and not by_surface)
+    grade: Grade = "bad" if lost else "doubtful"
     if enough:
         yield Judgement(
             subject="validity",
@@ -121,7 +122,10 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
 def _trusting(observed: Observed) -> str:
     """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
     if off_deg(observed) is None and _steady(observed):
-        return 'Use more lights; more light does not help. `aov=["error"]` says how far off each pixel may be.'
+        return (
+            "Measure the lights again, or use more of them; more light does not help. "
+            '`aov=["error"]` says how far off each pixel may be.'
+        )
     noise_deg = by_noise_deg(observed.facts)
     if moves(observed.facts) and noise_deg > NOISY_DEG:
         return (

@@ -16,6 +16,9 @@ MISFIT, LOST_MISFIT = 0.135, 0.25
 0.11 to 0.13 on photographs, two lights exchanged among five 0.18, a list in another order 0.19."""
 LEFT_OVER = 0.1
 """Where more is left over under a rig that is right, the report says what it may come from."""
+FEW_LIGHTS, OF_FOUR = 4, 0.02
+"""So many lights leave so little that more than the second may be directions that are 10 degrees off. (Waves and balls
+under four directions off by 5 degrees: 0.01 to 0.03, by 10: 0.02 to 0.06; under right ones: below 0.005.)"""
 NEARER = 0.7
 """Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
 widths away that a rig takes for distant: 0.2 to 0.5.) A surface that is not matte, as skin, explains a face's light
@@ -31,8 +34,17 @@ A wrong curve leaves the third at most, and the right one explains the light: me
 one, and is no matte surface under any."""
 
 
-def rig_explains(fit: RigFit) -> Judgement:
-    """Say that the rig is right, and how much it leaves over."""
+def rig_explains(fit: RigFit, *, lights: int) -> Judgement:
+    """Say that the rig of so many lights is right, and how much it leaves over; of four, whether that shows it."""
+    if lights == FEW_LIGHTS and fit.excess > OF_FOUR:
+        return Judgement(
+            subject="rig",
+            grade="unknown",
+            found=f"Whether the rig is right is not known: {100 * fit.misfit:.1f} % of the light is left over, and of "
+            "four lights directions that are 10 degrees off leave no more (2 to 6 %). Near lights that are taken for "
+            "distant, gloss and soft shadows leave as much.",
+            advice="Measure the lights on a sphere beside the subject, or use five lights and more.",
+        )
     found = f"The rig explains the plates: {100 * fit.misfit:.1f} % of the light is left over"
     if fit.misfit > LEFT_OVER:
         found += (
