@@ -544,3 +544,17 @@ def test_plates_of_a_clip_with_frames_missing_unseen_are_those_of_the_whole_clip
     last = list(gather(take, timing))[-1]
     for plate, slot in zip(last.plates, plan.lit_slots, strict=True):
         np.testing.assert_allclose(plate.image, plates(plan)[slot], atol=5e-3)
+
+
+@pytest.mark.parametrize(("true", "planned"), [(1.0, 0.99), (0.97, 1.0), (0.5, 0.515)])
+def test_an_exposure_that_is_off_by_more_than_a_flash_lasts_is_found(
+    true: float, planned: float, make_plan: PlanMaker
+) -> None:
+    """Behind a short readout one end of the exposure explained the flashes, and all were off by what the plan was."""
+    plan = make_plan(height_px=48, width_px=12, readout=0.11, shutter=true, fps=Fraction(25), duration_s=0.0003)
+    plan = replace(plan, dark_s=1.1 * plan.camera.exposure_s)
+    shot = shoot(plan, frames=100)
+    told = replace(plan, camera=replace(plan.camera, exposure_s=planned * plan.camera.frame_period_s))
+    timing = timing_from_rows(told, np.arange(100), shot.frames.mean(axis=2, dtype=np.float64))
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.exposure_s == pytest.approx(plan.camera.exposure_s, rel=1e-4)

@@ -35,6 +35,12 @@ SOFT = 3.0
 """Edges are soft where tails take away this much of the robust loss,"""
 UNTOLD = 0.6
 """and put the times in doubt by this share of how far tails beside a blur would move them: it may be tails or none."""
+FARTHEST, STEPS = 0.06, 2
+"""An exposure that is off by more than a flash lasts leaves rows far from where a flash is cut unexplained, so that no
+small step finds it. It is looked for up to this share of it, in steps of the shortest flash over the second: farther
+off, it is another shutter."""
+PROBED_ROWS, PROBED_FRAMES = 60, 240
+"""Rows and frames that it is looked for in."""
 TAILS, BLUR = ("rise_s", "fall_s"), "blur_s"
 """Tails are freed together: a rise or a fall alone changes how long a flash seems, both together when."""
 
@@ -60,9 +66,10 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
     first, known = fit, free
     refused: set[str] = set()
     unsure_s, soft_s, wider_s = 0.0, 0.0, dict[str, float]()
+    far = None if "exposure_s" in free else _far_exposure(plan, rows, fit)
     while True:
         names = tuple(name for name in _may_differ(plan) if name not in free and name not in refused)
-        more = _next(plan, rows, fit, free, names)
+        more = ("exposure_s",) if far else _next(plan, rows, fit, free, names)
         if not more:
             break
         if set(more) <= set(TAILS):
@@ -70,12 +77,13 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
             tried, unsure_s, soft_s = slow.fit, float(np.hypot(unsure_s, slow.unsure_s)), max(soft_s, slow.soft_s)
             taken = tried is not fit
         else:
-            tried = fitted(plan, rows, fit.beat, (*free, *more))
+            tried = fitted(plan, rows, far or fit.beat, (*free, *more))
             taken = taken_away(plan, rows, fit, tried) > max(BETTER * _loss(rows, fit), LEAST_GAIN) and _clear(
                 fit, tried, more
             )
+        started_far, far = far is not None, None
         if not taken:
-            refused |= set(more)
+            refused |= set() if started_far else set(more)
             continue
         if not set(more) <= set(TAILS) and _may_be_feigned(plan, rows, fit, tried):
             unsure_s = float(np.hypot(unsure_s, rms_apart_s(rows, fit.beat, tried.beat) / np.sqrt(2)))
@@ -88,6 +96,28 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
         unsure_s = float(np.hypot(unsure_s, BLURRED * blurred_s(plan, rows, fit)))
     errors_s = {name: float(np.hypot(error_s, wider_s.get(name, 0.0))) for name, error_s in fit.errors_s.items()}
     return Freed(fit=replace(fit, errors_s=errors_s) if wider_s else fit, unsure_s=unsure_s, soft_s=soft_s)
+
+
+def _far_exposure(plan: Plan, rows: Profiles, fit: Fit) -> Beat | None:
+    """Return the fit's beat with an exposure that is off by more than flashes last, if one explains more; else None.
+
+    Where the beginning of the exposure cuts flashes as the fit says, its end does not, or the reverse.
+    """
+    beat = fit.beat
+    part = rows.take(slice(0, PROBED_FRAMES)).binned(PROBED_ROWS)
+    known = unexplained(plan, part, beat)
+    step_s = plan.shortest_flash_s / STEPS
+    count = int(FARTHEST * beat.exposure_s / step_s)
+    longer_s = np.minimum(step_s * np.arange(-count, count + 1), max(rows.period_s - beat.exposure_s, 0.0))
+    tried = [
+        replace(beat.with_phase(beat.clock.phase_s + moved_s), exposure_s=beat.exposure_s + s)
+        for s in np.unique(longer_s[longer_s != 0.0]).tolist()
+        for moved_s in (0.0, s)
+    ]
+    losses = [robust_loss(part, unexplained(plan, part, one), known) for one in tried]
+    most = robust_loss(part, known, known)
+    gained = most - min(losses, default=most) > max(BETTER * most, LEAST_GAIN)
+    return tried[int(np.argmin(losses))] if gained else None
 
 
 def _may_be_feigned(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> bool:
