@@ -558,3 +558,21 @@ def test_an_exposure_that_is_off_by_more_than_a_flash_lasts_is_found(
     timing = timing_from_rows(told, np.arange(100), shot.frames.mean(axis=2, dtype=np.float64))
     assert rms_rows(timing, shot, plan) < 0.05
     assert timing.exposure_s == pytest.approx(plan.camera.exposure_s, rel=1e-4)
+
+
+def test_where_the_longer_flash_is_a_guess_so_are_the_times(make_plan: PlanMaker) -> None:
+    """In heavy noise any of five flashes may be the longer one: times were off by what that changes, unclaimed."""
+    plan = make_plan(
+        height_px=48, width_px=12, readout=0.88, shutter=0.25, fps=Fraction(24), lights=tuple("abcde"), dark=False
+    )
+    flash = replace(plan.flashes[0], duration_s=0.00045)
+    others = tuple(replace(one, duration_s=0.0003) for one in plan.flashes[1:])
+    plan = replace(plan, flashes=(flash, *others))
+    rng, down = np.random.default_rng(3), np.linspace(0, 1, 48)[:, None] * np.ones(12)
+    waves = {slot: np.sin(rng.uniform(2, 6) * down + rng.uniform(0, 6)) for slot in plan.lit_slots}
+    walls = {slot: np.asarray(0.3 + 0.2 * wave, np.float32) for slot, wave in waves.items()}
+    noise = Noise(full_well_e=20_000, read_e=2000)
+    shot = expose(walls, plan, frames=40, clock=TrueClock(phase_s=0.0123, offset_ppm=60.0), noise=noise, bits=12)
+    timing = timing_from_rows(plan, np.arange(40), shot.frames.mean(axis=2, dtype=np.float64))
+    assert timing.order == "guess"
+    assert (timing.phase_error_s or 0.0) > 0.2 * (flash.duration_s - others[0].duration_s)

@@ -265,8 +265,9 @@ def _strobe(
     indices: NDArray[np.int64],
     breaks: tuple[bool, bool] = (False, False),
 ) -> FoundStrobe:
-    beat, order = _order_of_lights(plan, found, first_light, indices, breaks)
-    return FoundStrobe(found=replace(found, fit=replace(found.fit, beat=beat)), order=order)
+    beat, order, apart_s = _order_of_lights(plan, found, first_light, indices, breaks)
+    error_s = float(np.hypot(found.fit.shift_error_s, apart_s))
+    return FoundStrobe(found=replace(found, fit=replace(found.fit, beat=beat, shift_error_s=error_s)), order=order)
 
 
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
@@ -300,15 +301,15 @@ def _as_profiles(
 
 def _order_of_lights(
     plan: Plan, found: ClipFit, first_light: str | None, indices: NDArray[np.int64], breaks: tuple[bool, bool]
-) -> tuple[Beat, Order]:
-    """Return the beat whose names are right, and how they are known."""
+) -> tuple[Beat, Order, float]:
+    """Return the beat whose names are right, how they are known, and by how much times are wrong if they are not."""
     if len(plan.cycle_slots) == 1:
-        return found.fit.beat, "given"
+        return found.fit.beat, "given", 0.0
     candidates = turns(plan, found.rows, found.fit.beat)
     if first_light is not None:
         firsts = [_first_complete(plan, found, beat, indices, breaks) for beat in candidates.beats]
-        return _given_order(candidates.beats, firsts, first_light), "given"
-    return candidates.beats[0], "marker" if candidates.sure else "guess"
+        return _given_order(candidates.beats, firsts, first_light), "given", 0.0
+    return candidates.beats[0], "marker" if candidates.sure else "guess", candidates.apart_s
 
 
 def _given_order(alike: Sequence[Beat], firsts: Sequence[HasLights | None], first_light: str) -> Beat:

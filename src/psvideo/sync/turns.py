@@ -13,7 +13,7 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.marker import alike_turns, turned_slot
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.beat import Beat, train_between
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.refine import CAUCHY, refined_beat, row_noise
 
@@ -32,10 +32,13 @@ TAKES_AWAY = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Turns:
-    """Beats that fit equally well as far as the picture shows, the likeliest first; ``sure`` where names cannot err."""
+    """Beats that fit equally well as far as the picture shows, the likeliest first; ``sure`` where names cannot err.
+    ``apart_s`` is by how much their flashes come at other times, as a root mean square over the clip: lengths differ.
+    """
 
     beats: tuple[Beat, ...]
     sure: bool
+    apart_s: float
 
 
 def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
@@ -48,7 +51,20 @@ def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
     names = {
         tuple(tuple(sorted(plan.flashes[s].lights.items())) for s in _seen_slots(plan, one, beat)) for one in alike
     }
-    return Turns(beats=tuple(alike), sure=len(names) == 1)
+    apart_s = max((_apart_s(plan, rows, alike[0], one) for one in alike[1:]), default=0.0)
+    return Turns(beats=tuple(alike), sure=len(names) == 1, apart_s=apart_s)
+
+
+def _apart_s(plan: Plan, rows: Profiles, one: Beat, other: Beat) -> float:
+    """Return how far one beat's flashes begin from the nearest ones of another, as a root mean square."""
+    first_s, last_s = rows.ends_s[[0, -1]].tolist()
+    own_s, others_s = (train_between(plan, beat.clock, first_s, last_s).start_s for beat in (one, other))
+    own_s = own_s[(own_s >= first_s) & (own_s <= last_s)]
+    if not len(own_s):
+        return 0.0
+    behind = np.clip(np.searchsorted(others_s, own_s), 1, len(others_s) - 1)
+    gap_s = np.minimum(np.abs(others_s[behind] - own_s), np.abs(own_s - others_s[behind - 1]))
+    return float(np.sqrt((gap_s**2).mean()))
 
 
 def _part(plan: Plan, rows: Profiles) -> Profiles:
