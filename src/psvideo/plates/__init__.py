@@ -2,8 +2,8 @@
 
 ``gather`` does it for a whole clip: begin there. On its way:
 
-- times and names: ``named_timing`` (when flashes fired), ``naming`` (which light is which), ``used_flashes`` (which
-  ones the frames that are used hold whole)
+- times and names: ``named_timing`` (when flashes fired), ``timing_misfit`` (whether a file can say so of this take),
+  ``naming`` (which light is which), ``used_flashes`` (which ones the frames that are used hold whole)
 - plates of flashes: ``split``; ``nearest_rows`` fills rows that a flash missed from the nearest round that saw them
 - rounds: ``light_plate`` and ``sequence`` collect them, ``upright`` turns them
 

@@ -14,7 +14,7 @@ def used_of(take: Take, timing: Timing, numbers: Sequence[int] | None = None) ->
     camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
     used = [places[number] for number in (numbers or take.numbers) if number in places]
-    begin, end = used[0], used[-1]
+    begin, end = (used[0], used[-1]) if used else (0, -1)  # all of them are repeated, and show nothing new
     flashes = tuple(
         replace(flash, complete=flash.complete and bool(first[n] >= begin and last[n] <= end))
         for n, flash in enumerate(timing.flashes)
