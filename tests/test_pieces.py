@@ -45,7 +45,11 @@ from psvideo.runs.instants.pieces import cut, piece_named
 from psvideo.runs.many_takes import handed_out
 from psvideo.runs.many_takes.cluster import Cluster, connected
 from psvideo.solve import steady
-from psvideo.strobe.runlog import PlayedFlash, RunLog, format_log, plan_sha256
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.replies import Identity
+from psvideo.strobe.program import make_program
+from psvideo.strobe.runlog import format_log, run_log
+from psvideo.strobe.session import Outcome, Ready
 
 CLIPS: dict[str, dict[str, Any]] = {
     "still": {},
@@ -389,27 +393,13 @@ def test_a_strobe_s_log_that_came_meanwhile_makes_it_another_run(tmp_path: Path)
     clip = filmed(tmp_path, frames=40)
     given = {"rig": clip / "rig.toml", "preview": ()}
     ps.normals(clip, out=tmp_path / "out", piece="1/2", **given)  # type: ignore[arg-type]
-    lit: list[dict[str, int]] = [{}, {"a": 500}, {"b": 1000}, {"c": 1000}]
-    log = RunLog(
-        plan="plan.toml",
-        plan_sha256=plan_sha256(clip / "plan.toml"),
-        board="a board",
-        unit="one",
-        firmware="1",
-        wiring="direct",
-        lines={"a": 0, "b": 1, "c": 2},
-        tick_ps=1_000_000,
-        tolerance_ppm=50.0,
-        flashes=[PlayedFlash(duration_ticks=1000, period_ticks=1000, lit_ticks=one) for one in lit],
-        dark_ticks=10100,
-        cycle_ticks=44400,
-        check=0,
-        started_utc="",
-        stopped_utc="",
-        start_tick=0,
-        cycles=1,
-        ended="done",
+    caps = capabilities(BOARDS["atmega328p"], "gated")
+    board = Ready(identity=Identity(proto=1, board="atmega328p", firmware="1", unit="one"), caps=caps)
+    program = make_program(ps.read_plan(clip / "plan.toml"), caps)
+    outcome = Outcome(
+        started_utc="", stopped_utc="", start_tick=0, cycles=1, ended="done", fault=None, message=None, clock=None
     )
+    log = run_log(clip / "plan.toml", board, program, outcome)
     (clip / "strobe.json").write_text(format_log(log))
     with pytest.raises(UsageError, match="other settings, footage, plan"):
         ps.normals(clip, out=tmp_path / "out", resume=True, **given)  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -340,3 +341,65 @@ def test_a_log_comes_back_as_it_was_and_a_broken_one_is_named(plan_file: Path) -
         with pytest.raises(PsvideoError, match=says) as caught:
             read_log(log)
         assert str(log) in str(caught.value)
+
+
+Edit = Callable[[dict[str, Any]], None]
+"""A change to what strobe.json holds."""
+
+
+def put(value: object, *keys: str | int) -> Edit:
+    def edit(log: Any) -> None:
+        for key in keys[:-1]:
+            log = log[key]
+        log[keys[-1]] = value
+
+    return edit
+
+
+@pytest.mark.parametrize("other_plan", [False, True])
+@pytest.mark.parametrize(
+    ("edit", "says"),
+    [
+        (lambda log: log["lines"].pop("key"), "lines has no key; expected every light that flashes"),
+        (put(9, "lines", "key"), r"key 'lines\.key' is 9"),
+        (put(-1, "lines", "key"), r"key 'lines\.key' is -1"),
+        (put(0, "flashes", 0, "lit_ticks", "key"), r"key 'flashes\[1\]\.lit_ticks\.key' is 0"),
+        (put(-5, "flashes", 0, "lit_ticks", "key"), r"key 'flashes\[1\]\.lit_ticks\.key' is -5"),
+        (put(99_999, "flashes", 0, "lit_ticks", "key"), r"lit_ticks\.key is 99999; expected at most duration_ticks"),
+        (put(10**30, "flashes", 0, "duration_ticks"), r"key 'flashes\[1\]\.duration_ticks' is 10{30}"),
+        (put(10**12, "flashes", 0, "period_ticks"), r"key 'flashes\[1\]\.period_ticks' is 10{12}"),
+        (put(10**9, "flashes", 0, "period_ticks"), "period_ticks is 1000000000; expected at most duration_ticks"),
+        (put(10**400, "tick_ps"), "key 'tick_ps'"),
+        (put(10**12, "dark_ticks"), "key 'dark_ticks' is 10{12}"),
+        (put(-1, "check"), "key 'check' is -1"),
+    ],
+)
+def test_a_log_of_what_no_board_plays_is_refused(plan_file: Path, edit: Edit, says: str, other_plan: bool) -> None:
+    log = plan_file.with_name("strobe.json")
+    assert run("strobe", "run", plan_file, "--port", "emulated", "--rounds", 1, "--log", log, "-q") == 0
+    data = json.loads(log.read_text())
+    edit(data)
+    log.write_text(json.dumps(data | ({"plan_sha256": "0" * 64} if other_plan else {})))
+    with pytest.raises(PsvideoError, match=says) as caught:
+        as_played(read_plan(plan_file), plan_file)
+    assert str(log) in str(caught.value)
+
+
+def test_a_log_whose_ticks_or_check_are_not_its_plan_s_is_not_used(plan_file: Path) -> None:
+    log = plan_file.with_name("strobe.json")
+    assert run("strobe", "run", plan_file, "--port", "emulated", "--rounds", 1, "--log", log, "-q") == 0
+    plan, whole = read_plan(plan_file), log.read_text()
+    assert as_played(plan, plan_file).warning is None
+    for edit in (
+        put(1, "tick_ps"),
+        put(0, "dark_ticks"),
+        put(1, "cycle_ticks"),
+        put(1, "check"),
+        put(7, "lines", "key"),
+    ):
+        data = json.loads(whole)
+        edit(data)
+        log.write_text(json.dumps(data))
+        found = as_played(plan, plan_file)
+        assert found.plan == plan
+        assert "strobe.json names the checksum of plan.toml, but its ticks or its check" in (found.warning or "")

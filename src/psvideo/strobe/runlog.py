@@ -7,14 +7,15 @@ import hashlib
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from psvideo.formats.contract import Contract, parse_record, read_json
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
 from psvideo.strobe.bursts import POWER_TOLERANCE
 from psvideo.strobe.clock import ClockFit
-from psvideo.strobe.limits import cycle_check, lit_ticks
+from psvideo.strobe.limits import CHECKED_LINES, LONGEST_DARK_TICKS, cycle_check, cycle_ticks, lit_ticks
 from psvideo.strobe.link.requests import Lit, Slot
 from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import PS_PER_S, Program, to_ticks
@@ -23,6 +24,8 @@ from psvideo.strobe.session import Ended, Outcome, Ready
 SCHEMA = "psvideo-strobe/1"
 ADVICE = "Take it away, or write it again."
 LOG_NAME = "strobe.json"
+MOST_TICKS = 2**32 - 1
+"""Boards count a flash's ticks in 32 bits."""
 CAMERA_CLOCK_PPM = 100.0
 """How far a camera's clock, a crystal, may be off."""
 
@@ -30,9 +33,18 @@ CAMERA_CLOCK_PPM = 100.0
 class PlayedFlash(Contract):
     """A flash of the plan's round as it was played: ``lit_ticks`` is how long each light was on, bursts summed."""
 
-    duration_ticks: int = Field(gt=0)
-    period_ticks: int = Field(gt=0)
-    lit_ticks: dict[str, int]
+    duration_ticks: int = Field(gt=0, le=MOST_TICKS)
+    period_ticks: int = Field(gt=0, le=MOST_TICKS)
+    lit_ticks: dict[str, Annotated[int, Field(gt=0)]]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.period_ticks > self.duration_ticks:
+            raise ValueError(f"period_ticks is {self.period_ticks}; expected at most duration_ticks")
+        for name, ticks in self.lit_ticks.items():
+            if ticks > self.duration_ticks:
+                raise ValueError(f"lit_ticks.{name} is {ticks}; expected at most duration_ticks, {self.duration_ticks}")
+        return self
 
 
 class Clock(Contract):
@@ -53,13 +65,13 @@ class RunLog(Contract):
     unit: str
     firmware: str
     wiring: WiringName
-    lines: dict[str, int]
-    tick_ps: int = Field(gt=0)
+    lines: dict[str, Annotated[int, Field(ge=0, lt=CHECKED_LINES)]]
+    tick_ps: int = Field(gt=0, le=PS_PER_S)
     tolerance_ppm: float = Field(ge=0)
     flashes: list[PlayedFlash] = Field(min_length=1)
-    dark_ticks: int = Field(ge=0)
+    dark_ticks: int = Field(ge=0, le=LONGEST_DARK_TICKS)
     cycle_ticks: int = Field(gt=0)
-    check: int
+    check: int = Field(ge=0, lt=2**16)
     started_utc: str
     stopped_utc: str
     start_tick: int
@@ -68,6 +80,15 @@ class RunLog(Contract):
     fault: str | None = None
     clock: Clock | None = None
     most_trim_ppm: float = Field(ge=0, default=0.0)
+
+    @model_validator(mode="after")
+    def _wires_every_light(self) -> Self:
+        lit = {name for flash in self.flashes for name in flash.lit_ticks}
+        if lit - self.lines.keys():
+            raise ValueError(
+                f"lines has no {', '.join(sorted(lit - self.lines.keys()))}; expected every light that flashes"
+            )
+        return self
 
 
 def run_log(plan_path: Path, ready: Ready, program: Program, outcome: Outcome, *, most_trim_ppm: float = 0.0) -> RunLog:
@@ -146,17 +167,26 @@ def as_played(plan: Plan, plan_path: Path) -> AsPlayed:
     if plan.mode == "synced" or not path.is_file():
         return AsPlayed(plan=plan)
     log = read_log(path)
-    if not _fits(plan, log) or (log.plan_sha256 != plan_sha256(plan_path) and not _plays(plan, log)):
-        return AsPlayed(
-            plan=plan,
-            warning=f"{path.name} is the log of another plan than {plan_path.name} beside it, and is not used; put the "
-            "plan that the strobe played beside the footage, or take the log away",
-        )
+    if not _fits(plan, log) or not _plays(plan, log):
+        return AsPlayed(plan=plan, warning=_why_unused(log, path, plan_path))
     broke = f"the strobe's run broke off ({log.fault}), says {path.name}" if log.fault is not None else None
     return AsPlayed(
         plan=_played(plan, log),
         warning=broke,
         note=f"{path.name}: times as {log.board} played them, {_clock_words(log)}",
+    )
+
+
+def _why_unused(log: RunLog, path: Path, plan_path: Path) -> str:
+    if log.plan_sha256 == plan_sha256(plan_path):
+        return (
+            f"{path.name} names the checksum of {plan_path.name}, but its ticks or its check are not what that plan "
+            "gives, so it was changed, and is not used; put the log beside the footage as it was written, or take it "
+            "away"
+        )
+    return (
+        f"{path.name} is the log of another plan than {plan_path.name} beside it, and is not used; put the plan that "
+        "the strobe played beside the footage, or take the log away"
     )
 
 
@@ -176,7 +206,8 @@ def _plays(plan: Plan, log: RunLog) -> bool:
             if abs(ticks / played.duration_ticks - asked) > POWER_TOLERANCE * asked:
                 return False
     slots = [_slot_of(flash, log) for flash in log.flashes]
-    return cycle_check([slots[slot] for slot in plan.cycle_slots]) == log.check
+    cycle = [slots[slot] for slot in plan.cycle_slots]
+    return (cycle_check(cycle), cycle_ticks(cycle)) == (log.check, log.cycle_ticks)
 
 
 def _slot_of(flash: PlayedFlash, log: RunLog) -> Slot:
