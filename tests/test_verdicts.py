@@ -33,6 +33,7 @@ from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
+from psvideo.report.judge.rig_of_three import STRONGER, turned_deg
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
@@ -408,13 +409,14 @@ SOLVED = [
     _by("rig lost", rig_but_leaning, "rig", {"claimed_deg": 26}, {"claimed_deg": 40}, "doubtful bad", shape="waves",
         lights=8),
     _by("strength", rig_of, "rig", {"claimed_gain": 1.15}, {"claimed_gain": 1.4}, shape="waves"),
-    _by("turned", rig_but_leaning, "rig", {"turned_deg": 24}, {"turned_deg": 27}, shape="waves", lights=3),
+    _by("turned", rig_but_leaning, "rig", {"turned_deg": 24}, {"turned_deg": 27}, "nothing doubtful", shape="waves",
+        lights=3),
     _by("turned around", rig_but_leaning, "rig", {"turned_deg": 31}, {"turned_deg": 35}, "doubtful bad", shape="waves",
         lights=3),
     _by("accuracy", accuracy, "accuracy", {"claimed_deg": 1}, {"claimed_deg": 5}, shape="waves", lights=8),
     _by("noise alone", validity, "validity", {"noise": 0.025}, {"noise": 0.032}, "doubtful bad"),
     _by("weak beside the rig", lamps, "lights", {"gains": [1, 0.15, 1]}, {"gains": [1, 0.1, 1]}, "good bad", lights=3),
-    _by("tilted", rig_of, "rig", {"claimed_tilt_deg": 5}, {"claimed_tilt_deg": 9}, lights=3),
+    _by("tilted", rig_of, "rig", {"claimed_tilt_deg": 5}, {"claimed_tilt_deg": 9}, "nothing doubtful", lights=3),
     _by("tilted much", rig_of, "rig", {"claimed_tilt_deg": 14}, {"claimed_tilt_deg": 19}, "doubtful bad", lights=8),
     _by("rolled", rig_of, "rig", {"turned_deg": 8}, {"turned_deg": 10}, lights=4),
     _by("away", rig_but_leaning, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
@@ -1206,3 +1208,23 @@ def test_under_three_lights_strengths_may_be_why_normals_lean() -> None:
     (line,) = rig_of(one)
     assert line.grade != "good"
     assert "directions or strengths" in line.found or "other strengths" in line.found
+    assert "exchanged" in line.found
+
+
+@pytest.mark.parametrize(("gain", "unmeasured"), [(1.0, True), (1.1, False)])
+def test_three_lights_do_not_show_the_rig_to_be_right(gain: float, unmeasured: bool) -> None:
+    """One light is as strong as the rig says or a tenth weaker: nothing shows it, so nothing is called good."""
+    (line,) = rig_of(Footage(lights=3, claimed_gain=gain, solved=True).observed(0))
+    assert line.grade == "unknown"
+    assert "other strengths or with two lights exchanged" in line.found
+    assert "flat-field" in line.advice
+    assert ("the strength 1" in line.found) is unmeasured
+
+
+def test_a_light_that_is_stronger_than_the_rig_says_turns_normals_as_far_as_is_said() -> None:
+    vectors = ring(3)
+    shades = vectors @ np.array([0, 0, 1]) * np.array([1, STRONGER, 1])
+    normal = np.linalg.solve(vectors, shades)
+    off_deg = float(np.degrees(np.arccos(normal[2] / np.linalg.norm(normal))))
+    assert off_deg > 3
+    assert turned_deg(vectors) == pytest.approx(off_deg), "lights in a ring all do the same"

@@ -14,6 +14,7 @@ from psvideo.report.judge.rig_by_plates import (
     rig_misfits,
     shining_surface,
 )
+from psvideo.report.judge.rig_of_three import three_lights
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
@@ -56,11 +57,7 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     elif fit is not None:
         yield rig_explains(fit, lights=int(observed.firing.sum()))
     elif observed.slopes:
-        yield Judgement(
-            subject="rig",
-            grade="good",
-            found="The normals fit together as one surface's; three lights show no more of the rig.",
-        )
+        yield three_lights(observed)
 
 
 def _beside_weaker(weaker: Sequence[str]) -> Judgement:

@@ -39,7 +39,7 @@ FLAT = (
     "The normals are not quite those of one surface, and would be if all leaned otherwise: the lights lie nearly in a "
     "plane, so that gloss, light from around or a rig that is a little off turn all of them."
 )
-OR_STRENGTHS = " Under three lights other strengths than the rig's may do the same."
+OR_STRENGTHS = " Under three lights other strengths than the rig's, or two lights exchanged, may do the same."
 TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
@@ -122,8 +122,9 @@ def normals_lean(observed: Observed) -> Judgement | None:
         found=FLAT if flat else _leaning_words(usual, whole=whole, exact=exact),
         advice="Add lights from other sides, farther from the plane of these."
         if flat
-        else "Measure the lights again with the camera where it stands. If the picture is cropped at one side, or the "
-        "lens is shifted, write focal_px and principal_px into the rig.",
+        else ("Check that lights have the same names in plan and rig; if they do, measure" if exact else "Measure")
+        + " the lights again with the camera where it stands. If the picture is cropped at one side, or the lens is "
+        "shifted, write focal_px and principal_px into the rig.",
     )
 
 
@@ -167,8 +168,8 @@ def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
         )
     if exact:
         return (
-            f"The rig's directions or strengths are off: {as_they_are} tilted otherwise by about "
-            f"{usual.lean_deg:.0f} degrees they would be."
+            f"The rig's directions or strengths are off, or two lights are exchanged: {as_they_are} tilted otherwise "
+            f"by about {usual.lean_deg:.0f} degrees they would be. Exchanged lights turn them by far more."
         )
     return f"The rig's directions are off: {as_they_are} tilted otherwise they would be."
 

@@ -30,11 +30,12 @@ class PointLight(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 class RigPoints:
     """Pixels (point,) as ``rows`` and ``cols``, and what the rig sends there under each light's full flash, ``vectors``
-    (point or 1, light, 3)."""
+    (point or 1, light, 3). ``strengths_all_one``: the rig gives all lights the strength 1."""
 
     rows: NDArray[np.intp]
     cols: NDArray[np.intp]
     vectors: Doubles
+    strengths_all_one: bool = False
 
     def light(self, one: Round) -> PointLight:
         """Return the light of a round at the points."""
@@ -76,5 +77,7 @@ def rig_points(plan: Plan, rig: Rig, *, height_px: int, width_px: int, channels:
         PlannedFlash(lights={light: 1.0}, duration_s=reference_duration_s(plan, light)) for light in plan.lights
     )
     vectors = light_vectors(replace(plan, flashes=alone), rig, points)
-    near = any(light.position_m is not None for light in rig.select(plan.lights))
-    return RigPoints(rows=rows, cols=cols, vectors=vectors if near else vectors[:1])
+    lights = rig.select(plan.lights)
+    near = any(light.position_m is not None for light in lights)
+    all_one = all(strength == 1.0 for light in lights for strength in light.intensity)
+    return RigPoints(rows=rows, cols=cols, vectors=vectors if near else vectors[:1], strengths_all_one=all_one)
