@@ -32,6 +32,7 @@ from psvideo.plates.align import light_history
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
 from psvideo.plates.spread import rounds_spread, spread_over
+from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
@@ -317,6 +318,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
         facts=KeptFacts([facts]),
         counts={"a": np.arange(5), "b": np.arange(5) * 2},
         blurs_px=[0.7],
+        noises=[AgainstNoise(level=1 / 3, read=1e-6, photon=2 / 3)],
         leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
         light_at_points=[PointLight(np.random.default_rng(1).random((4, 2)), np.array([1.0, 4.0]))],
         in_shadow=[0.04],
@@ -329,6 +331,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     seen = found.observed
     assert (numbers, found.reserved, list(seen.facts)) == (range(1003, 1004), ("No scale.",), [facts])
     assert (seen.blurs_px, seen.ambient_measured) == ([0.7], {128: 0.25})
+    assert seen.noises == observed.noises
     assert (seen.leans, seen.in_shadow) == (observed.leans, [0.04])
     assert all(np.array_equal(seen.counts[light], observed.counts[light]) for light in observed.counts)
     assert np.array_equal(seen.light_at_points[0].light, observed.light_at_points[0].light)

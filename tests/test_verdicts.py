@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from psvideo.clip import Masks
-from psvideo.clip.transfer import stops_unused
 from psvideo.model.camera import Camera, Encoding
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
@@ -35,6 +34,7 @@ from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judge.rig_of_three import STRONGER, turned_deg
 from psvideo.report.judgement import Judgement, verdict_of
+from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import count_levels
@@ -435,27 +435,38 @@ SOLVED = [
 ]  # fmt: skip
 
 
-PQ = Encoding(transfer="st2084")
-
-
-@pytest.mark.parametrize(("stops", "encoding", "grade"), [
-    (-3.7, PQ, "good"),  # 1,000 cd/m2, all that cameras record as PQ, is 3.3 stops below its largest code
-    (-7.0, PQ, "doubtful"),
-    (-9.5, PQ, "bad"),
-    (-3.7, replace(PQ, white_level=769.0), "doubtful"),  # the plan says where the sensor saturates
-    (-3.7, Encoding(transfer="logc4"), "good"),  # ends 11.3 stops above middle grey
-    (-3.7, Encoding(transfer="hlg"), "doubtful"),
-])  # fmt: skip
-def test_a_curve_that_reaches_beyond_all_sensors_makes_no_picture_dark(
-    stops: float, encoding: Encoding, grade: str
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    ("times_noise", "grade"), [(80, "good"), (24, "good"), (13, "doubtful"), (7, "doubtful"), (3, "bad"), (1, "bad")]
+)
+@pytest.mark.parametrize(
+    ("transfer", "stops"), [("logc3", -6.4), ("slog3", -5.9), ("logc4", -11.0), ("st2084", -7.0), ("hlg", -4.5)]
+)
+def test_a_scene_far_below_its_curves_end_is_judged_by_its_noise(
+    transfer: str, stops: float, times_noise: float, grade: str, seed: int
 ) -> None:
-    one = Footage(stops=stops, noise=1e-5).observed(0)
+    """LogC3 with diffuse white where it belongs was "not usable": 6.4 stops below the largest code, and 25 times its
+    noise."""
+    one = Footage(stops=stops, noise=2.0**stops / times_noise).observed(seed)
     plan = plan_of(one.lights)
-    plan = replace(plan, camera=replace(plan.camera, encoding=encoding))
-    lines = judgements(plan, timing_of(), one)
-    assert graded(lines, "exposure") == grade
-    said = next(line.found for line in lines if line.subject == "exposure")
-    assert ("saturation" in said) == (stops_unused(encoding) == 0)
+    for white in (None, 50000.0):  # the plan may say where the sensor saturates
+        encoding = Encoding(transfer=transfer, white_level=white)
+        lines = judgements(replace(plan, camera=replace(plan.camera, encoding=encoding)), timing_of(), one)
+        assert graded(lines, "exposure") == grade
+        said = next(line.found for line in lines if line.subject == "exposure")
+        assert ("saturation" in said) == (white is not None)
+
+
+def test_a_bright_scene_is_not_dark_for_its_grain() -> None:
+    one = Footage(stops=-2, noise=0.05).observed(0)
+    assert graded(list(judge_exposure(one, under="the largest code")), "exposure") == "good"
+
+
+@pytest.mark.parametrize(("read", "photon"), [(1e-6, 0.0), (1e-7, 1e-4), (0.0, 1e-3)])
+def test_so_many_stops_more_light_is_as_many_times_its_noise(read: float, photon: float) -> None:
+    dim = AgainstNoise(level=0.003, read=read, photon=photon)
+    lit = replace(dim, level=dim.level * 2 ** dim.stops_to(25))
+    assert lit.ratio == pytest.approx(25)
 
 
 def test_a_subject_that_clips_everywhere_is_called_so_and_is_told_to_look_again() -> None:

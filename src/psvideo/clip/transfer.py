@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError, UsageError, nearest
 from psvideo.model.arrays import Doubles
-from psvideo.model.camera import Encoding
 
 STUDIO_CONFIG = "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
 UNKNOWN_COLOUR = "unknown"
@@ -23,19 +22,12 @@ FAR_APART = 0.1
 """Curves of pictures for display lie up to 0.05 of white apart; light, HLG, PQ and logarithms 0.15 or more."""
 
 
-PEAK = 0.18 * 2**8
-"""No sensor saturates more than 8 stops above middle grey: an ALEXA 35 does there (ARRI), others at 5 to 7."""
-PQ_PEAK = 10.0
-"""What cameras record as PQ ends at 1,000 cd/m2 (ITU-R BT.2408, nominal peak); the curve's scale is 100 cd/m2."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class TransferCurve:
     """One curve: its short name, OpenColorIO's name of it, and the colour interop id of its camera's linear gamut.
 
     ``colour`` is ``unknown`` where the curve is used with several gamuts. ``on_codes``: its maker defines the curve
-    on recorded code values, and so for movies on codes before video range is expanded. ``peak`` is the light, on the
-    curve's own scale, above which nothing is recorded.
+    on recorded code values, and so for movies on codes before video range is expanded.
     """
 
     name: str
@@ -43,7 +35,6 @@ class TransferCurve:
     colour: str = UNKNOWN_COLOUR
     on_codes: bool = False
     also: tuple[str, ...] = ()
-    peak: float = PEAK
 
 
 CURVES = (
@@ -119,9 +110,7 @@ CURVES = (
     ),
     TransferCurve(name="applelog", source="Apple Log - Curve", colour="lin_rec2020_scene"),
     TransferCurve(name="acescct", source="CURVE - ACEScct-LOG_to_LINEAR", colour="lin_ap1_scene"),
-    TransferCurve(
-        name="st2084", source="ST-2084 - Curve", colour="lin_rec2020_scene", also=("pq", "smpte2084"), peak=PQ_PEAK
-    ),
+    TransferCurve(name="st2084", source="ST-2084 - Curve", colour="lin_rec2020_scene", also=("pq", "smpte2084")),
     TransferCurve(name="hlg", source="CURVE - HLG-OETF-INVERSE", colour="lin_rec2020_scene", also=("aribstdb67",)),
 )
 
@@ -238,17 +227,15 @@ def is_another_curve(named: str, tagged: str | None) -> bool:
     return float(np.abs(read / read[-1] - told / told[-1]).max()) >= FAR_APART
 
 
-def stops_unused(encoding: Encoding) -> float:
-    """Return by how many stops the largest code lies above all that cameras record by this curve; 0 where the plan says
-    which code is white.
+def records_scene(transfer: str) -> bool:
+    """Return whether a curve holds a scene far beyond its white, as logarithms, PQ and HLG do: how far light lies below
+    the largest code then says little of its exposure.
 
-    >>> round(stops_unused(Encoding(transfer="pq")), 1), stops_unused(Encoding(transfer="srgb"))
-    (3.3, 0.0)
+    >>> records_scene("logc3"), records_scene("hlg"), records_scene("rec709")
+    (True, True, False)
     """
-    curve = find_curve(encoding.transfer)
-    if encoding.white_level is not None or not curve.source:
-        return 0.0
-    return max(float(np.log2(to_light(curve, np.ones(1))[0] / curve.peak)), 0.0)
+    name = find_curve(transfer).name
+    return name in ("st2084", "hlg") or name not in DISPLAYED
 
 
 def to_light(curve: TransferCurve, signal: Doubles | NDArray[np.float32]) -> Doubles:

@@ -1,10 +1,10 @@
 """All judgements of a take, line by line: what check says on the set, and the report after a run."""
 
-from psvideo.clip.transfer import stops_unused
+from psvideo.clip.transfer import records_scene
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import ambient
-from psvideo.report.judge.of_exposure import exposure
+from psvideo.report.judge.of_exposure import Ceiling, exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
@@ -33,9 +33,11 @@ def judgements(
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
-    exposed = (
-        (saturation,) if saturation else tuple(exposure(observed, unused_stops=stops_unused(plan.camera.encoding)))
-    )
+    encoding = plan.camera.encoding
+    under: Ceiling = "saturation"
+    if records_scene(encoding.transfer):
+        under = "the sensor's saturation" if encoding.white_level is not None else "the largest code"
+    exposed = (saturation,) if saturation else tuple(exposure(observed, under=under))
     lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt))
     return (
         *on_time,

@@ -21,6 +21,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
+from psvideo.report.observe.against_noise import AgainstNoise, against_noise
 from psvideo.report.observe.alignment.astray import Astray, astray
 from psvideo.report.observe.facts import FAINT, Dark, Seen, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
@@ -65,6 +66,7 @@ class Observed:
     lights' own pictures are even, for then nothing shows what it falls on.
     ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
     plate.
+    ``noises`` are how far the subject's light stands out of the plates' noise.
     ``stills`` says that the pictures of a round are photographs, each under its own light; ``astray`` is by how far
     they lie apart.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
@@ -83,6 +85,7 @@ class Observed:
     facts: KeptFacts = field(default_factory=KeptFacts)
     counts: dict[str, Integers] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)
+    noises: list[AgainstNoise] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     away: list[float] = field(default_factory=list)
     leans: list[Lean] = field(default_factory=list)
@@ -184,6 +187,7 @@ class Observed:
         for light, counted in other.counts.items():
             self.counts[light] = self.counts.get(light, np.zeros(BINS + 2, np.int64)) + counted
         self.blurs_px += other.blurs_px
+        self.noises += other.noises
         self.slopes += other.slopes
         self.away += other.away
         self.leans += other.leans
@@ -235,6 +239,10 @@ class Observed:
         blur_px = sharpest_blur_px(middle_of(watched.picture))
         if blur_px is not None:
             self.blurs_px.append(blur_px)
+        yield
+        noise = against_noise(one, seen)
+        if noise is not None:
+            self.noises.append(noise)
         yield
         if surface is not None:
             small = self.look_at_slopes(surface)

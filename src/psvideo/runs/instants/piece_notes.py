@@ -17,6 +17,7 @@ from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.surface import Reflectance, Subject
 from psvideo.model.timing import Timing
+from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.alignment.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
@@ -33,6 +34,7 @@ BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
 ASTRAY = TypeAdapter(tuple[Astray, ...])
+NOISES = TypeAdapter(tuple[AgainstNoise, ...])
 LEANS = TypeAdapter(tuple[Lean, ...])
 
 
@@ -45,6 +47,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "facts": [asdict(one) for one in seen.facts],
         "counts": {light: counted.tolist() for light, counted in seen.counts.items()},
         "blurs_px": seen.blurs_px,
+        "noises": [asdict(one) for one in seen.noises],
         "slopes": seen.slopes,
         "away": seen.away,
         "leans": [asdict(one) for one in seen.leans],
@@ -129,6 +132,7 @@ def _read(path: Path) -> tuple[range, Found]:
             facts=KeptFacts(FACTS.validate_python(record["facts"])),
             counts={light: np.array(counted, np.int64) for light, counted in record["counts"].items()},
             blurs_px=record["blurs_px"],
+            noises=list(NOISES.validate_python(record["noises"])),
             slopes=record["slopes"],
             away=record["away"],
             leans=list(LEANS.validate_python(record["leans"])),
