@@ -10,7 +10,7 @@ from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.against_noise import AgainstNoise, usual
-from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
+from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE, Levels
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.thinned import slips
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
@@ -22,6 +22,8 @@ NOISY, LOST, CLEAN = 15.0, 4.0, 30.0
 """How many times its noise a subject's light is, where a curve reaches far beyond it; CLEAN is what is advised. Of a
 bust in LogC3 under five lights, 38 degrees from the axis, normals were off by 1.4 degrees at 25 times the noise, 3.1 at
 12.5, and 13 at 2.6, where none was trusted."""
+LIFTED = 2.58
+"""Of an even surface, noise lifts the level below which TARGET_QUANTILE lies by so many standard deviations (Gauss)."""
 Ceiling = Literal["saturation", "the sensor's saturation", "the largest code"]
 """What light is below: where it is not ``saturation`` itself, the curve records a scene far beyond its white, and light
 is judged by its noise."""
@@ -52,8 +54,9 @@ def exposure(observed: Observed, *, under: Ceiling = "saturation") -> Iterator[J
     top_stops = max(one.stops(TARGET_QUANTILE) for one in levels.values())
     share = max(one.clipped_share for one in levels.values())
     noise = usual(observed.noises) if under != "saturation" and observed.noises else None
-    if top_stops < DIM_STOPS and noise is not None and noise.ratio < NOISY:
-        yield _noisy(top_stops, noise, under)
+    without_noise = top_stops if noise is None else _without_noise(top_stops, noise)
+    if without_noise < DIM_STOPS and noise is not None and noise.ratio < NOISY:
+        yield _noisy(without_noise, noise, under)
     elif top_stops < DIM_STOPS and under == "saturation":
         yield _dark(top_stops)
     elif not clipped:
@@ -93,6 +96,11 @@ def _dark(top_stops: float) -> Judgement:
         f"{-top_stops:.1f} stops below saturation, so noise is large.",
         advice=f"Open the aperture by about {_half(BEST_STOPS - top_stops)}, or flash longer or stronger. {FEWER_BITS}",
     )
+
+
+def _without_noise(top_stops: float, noise: AgainstNoise) -> float:
+    """Return where the brightest parts lie without the noise that lifts them."""
+    return float(np.log2(max(2.0**top_stops - LIFTED * noise.sigma, 2.0**-STOPS)))
 
 
 def _noisy(top_stops: float, noise: AgainstNoise, under: Ceiling) -> Judgement:

@@ -23,7 +23,12 @@ class AgainstNoise:
     @property
     def ratio(self) -> float:
         """How many times its standard deviation the light is."""
-        return self.level / float(np.sqrt(self.read + self.photon * self.level))
+        return self.level / self.sigma
+
+    @property
+    def sigma(self) -> float:
+        """The standard deviation at the subject's level."""
+        return float(np.sqrt(self.read + self.photon * self.level))
 
     def stops_to(self, ratio: float) -> float:
         """Return by how many stops more light is as many times its noise: the root of ``(kL)² = ratio² (read + photon
