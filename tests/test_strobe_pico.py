@@ -213,6 +213,27 @@ def test_a_state_machine_that_runs_dry_is_a_fault(cycles: int) -> None:
     assert pico.edges[-1].tick < 1_250_000 + 5 * 1_100_000
 
 
+@pytest.mark.parametrize("before_ms", [1, 3])
+def test_a_run_that_ends_while_memory_is_collected_is_done(before_ms: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind a run's end the state machines run dry, as they should; the clock may have been read before it."""
+    pico = running(10)
+    end = 1_250_000 + 10 * 2 * 1_100_000
+    pico.advance(end - before_ms * MS)
+    ticks = pico.controller.hardware.ticks
+
+    def then_collected() -> int:
+        now: int = ticks()
+        pico.chip.advance(now + 5 * MS)
+        return now
+
+    with monkeypatch.context() as collecting:
+        collecting.setattr(pico.controller.hardware, "ticks", then_collected)
+        pico.controller.poll()
+    pico.advance(end + 20 * MS)
+    said = b"OK state=idle fault=none reset=power interlock=closed cycle=10 step=0 cycles=10\n"
+    assert pico.feed(b"STAT\n", end + 20 * MS) == said
+
+
 @pytest.mark.parametrize(
     ("chip", "reason", "scratch", "cause"),
     [

@@ -52,22 +52,23 @@ class Controller:
 
     def poll(self):
         """Let happen what is due."""
+        starved = self.hardware.starved()  # ahead of the clock: the run may end while memory is collected in between
         self.now = self.hardware.ticks()
         silent = self.heard + self.keep_ms * TICKS_PER_MS
         if self.state == "running":
-            self._watch_run(silent)
+            self._watch_run(silent, starved)
         if self.state in ("armed", "running"):
             if self.hardware.interlock_open():
                 self._fail("interlock")
             elif self.now >= silent:
                 self._fail("silent")
 
-    def _watch_run(self, silent):
+    def _watch_run(self, silent, starved):
         end = self.start + self.cycles * self.cycle_ticks
         if self.cycles and end <= min(self.now, silent):
             self._darken("idle")
             self.cycle, self.step = self.cycles, 0
-        elif self.hardware.starved() and not (self.cycles and self.now > end - MIN_DARK):
+        elif starved and not (self.cycles and self.now > end - MIN_DARK):
             self._fail("late")
         elif self.cycles > TURNS and not self.end_is_set:
             self._set_end((self.now - self.start) // self.cycle_ticks)
