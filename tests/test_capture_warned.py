@@ -53,8 +53,30 @@ def test_a_margin_thinner_than_the_clocks_is_warned_of_with_what_would_do() -> N
     assert "margin" not in kinds(planned())
     thin = planned(dark="10.0005ms")
     assert "50 ppm" in text_of(thin, "margin")
-    assert "10.001ms" in text_of(thin, "margin")
+    assert "at least 10.0011ms" in text_of(thin, "margin"), "10.001ms is 0.01 ppm short of the clocks' 100"
     assert "margin" not in kinds(planned(dark="10.0011ms"))
+
+
+@pytest.mark.parametrize("tolerance", ["0", "100", "5000", "unknown"])
+@pytest.mark.parametrize("fps", ["23.976", "24", "29.97", "59.94", "119.88", "240", "1000/3", "999"])
+def test_the_dark_time_and_the_exposure_that_are_advised_do(fps: str, tolerance: str) -> None:
+    """Rounded to the nearest, half of them fell short and were answered with the same advice again."""
+    camera = {"fps": fps, "readout": "0", "flash": "50us", "strobe_clock_ppm": tolerance}
+    for refused, why in (("dark", "at least"), ("exposure", "at most")):
+        wrong = planned(**camera).plan.camera.exposure_s * (0.9 if refused == "dark" else 1.1)
+        with pytest.raises(UsageError) as said:
+            planned(**camera, **{refused: f"{wrong * 1e3}ms"})
+        advised = re.search(rf"{why} ([\d.]+) ?(ms|s)\b", str(said.value))
+        assert advised is not None
+        assert "margin" not in kinds(planned(**camera, **{refused: f"{advised[1]}{advised[2]}"}))
+
+
+@pytest.mark.parametrize("speed", [600, 700, 1700])
+def test_the_flash_that_is_advised_for_sharpness_is_sharp(speed: int) -> None:
+    limits = {"speed": str(speed), "max_blur": 0.8}
+    advised = re.search(r"at most ([\d.]+) (ms|us)", text_of(planned(flash="2ms", **limits), "blur"))
+    assert advised is not None
+    assert "blur" not in kinds(planned(flash=f"{advised[1]}{advised[2]}", **limits))
 
 
 def test_limits_of_the_leds_that_a_given_flash_passes_are_named_with_what_would_fit() -> None:

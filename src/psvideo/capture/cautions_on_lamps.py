@@ -8,7 +8,7 @@ from psvideo.capture.request import Limits
 from psvideo.model.cost.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS
-from psvideo.model.units import show_seconds
+from psvideo.model.units import no_more, show_seconds
 
 MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
@@ -59,8 +59,8 @@ def about_blur(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
     yield warning(
         "blur",
         f"A flash of {show_seconds(worst.duration_s)} blurs {worst.blur_px:.3g} px at {limits.speed_px_s:g} px/s, over "
-        f"the limit of {limits.max_blur_px:g} px. Flash for at most {show_seconds(_longest_s(limits))}, or slow the "
-        "subject down.",
+        f"the limit of {limits.max_blur_px:g} px. Flash for at most "
+        f"{show_seconds(no_more(_longest_s(limits)))}, or slow the subject down.",
     )
 
 
@@ -119,7 +119,7 @@ def about_the_leds(plan: Plan, figures: ShootFigures, limits: Limits) -> Iterato
         if limits.max_duty is not None and light.duty > limits.max_duty * (1 + 1e-9):
             too_often.setdefault(light.duty, []).append(light)
     for pulse_s, names in too_long.items():
-        limit = show_seconds(limits.max_pulse_s or 0.0)
+        limit = show_seconds(no_more(limits.max_pulse_s or 0.0))
         text = f"{_and(names)}: flashes of {show_seconds(pulse_s)}, over the limit of {limit}. Give at most that."
         yield warning("pulse", text)
     for duty, lights in too_often.items():
@@ -129,7 +129,7 @@ def about_the_leds(plan: Plan, figures: ShootFigures, limits: Limits) -> Iterato
             "duty",
             f"{_and([light.name for light in lights])}: on for {duty:.2%} of the time, over the limit of "
             f"{limit_share:.2%}. "
-            f"Flashes of {show_seconds(fits_s)} for every light would fit; more lights in the round help too.",
+            f"Flashes of {show_seconds(no_more(fits_s))} for every light would fit; more lights in the round help too.",
         )
 
 

@@ -15,7 +15,7 @@ from psvideo.model.cost.in_step import (
 from psvideo.model.cost.motion_cost import LEAST_PX, cost_words, motion_cost
 from psvideo.model.cost.shoot_figures import LEAST_MISSING, ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
-from psvideo.model.units import show_ppm, show_seconds
+from psvideo.model.units import no_less, no_more, show_ppm, show_seconds
 
 MOST_LOST = 0.2
 """Where motion costs more of the normals than this share, people should know before they shoot."""
@@ -35,7 +35,7 @@ def about_the_margin(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
         "margin",
         f"The dark time leaves a margin of {show_ppm(margin)}, and the clocks may be "
         f"{show_ppm(plan.clock_range_ppm)} apart: then two flashes mix near the dark row{rows}. Leave `dark_s` out, or "
-        f"give at least {needed_s * 1e3:.6g}ms.",
+        f"give at least {no_less(needed_s * 1e3, figures=6):.6g}ms.",
     )
 
 
@@ -98,7 +98,7 @@ def _free_of_three(plan: Plan) -> str:
     free_s = camera.frame_period_s - abs(camera.readout_s or 0.0) + abs(camera.row_time_s)
     if abs(camera.exposure_s - camera.frame_period_s) > 1e-6 * camera.frame_period_s or free_s < 20e-6:
         return ""
-    return f"Flashes of up to {show_seconds(free_s)} never do. "
+    return f"Flashes of up to {show_seconds(no_more(free_s))} never do. "
 
 
 def _equation_11(plan: Plan, wide: list[SlotFigures]) -> str:

@@ -12,7 +12,7 @@ from psvideo.errors import UsageError
 from psvideo.model.cost.shoot_figures import ShootFigures, shoot_figures
 from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, assemble_plan
-from psvideo.model.units import show_seconds
+from psvideo.model.units import no_less, show_seconds
 
 DARK_SLOT_EVERY_S = 0.5
 """Dark slots come about twice a second, where a board holds that many flashes: often enough to follow ambient light,
@@ -142,5 +142,5 @@ def _refuse_short_dark(request: ShootRequest, dark_s: float) -> None:
             f"A dark time of {show_seconds(dark_s)} is shorter than the exposure of {show_seconds(exposure_s)}: some "
             "rows "
             f"would hold two flashes, which nothing can part again (eq. 1). Leave `dark_s` out, or give at least "
-            f"{exposure_s / (1 - ppm * 1e-6) * 1e3:.5g}ms, the exposure and the clocks' margin."
+            f"{no_less(exposure_s / (1 - ppm * 1e-6) * 1e3, figures=6):.6g}ms, the exposure and the clocks' margin."
         )

@@ -9,7 +9,7 @@ from psvideo.capture.cameras import HOW_TO_MEASURE, CameraMode, find_mode, find_
 from psvideo.errors import UsageError
 from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Mode
-from psvideo.model.units import show_rate, show_seconds
+from psvideo.model.units import no_more, show_rate, show_seconds
 
 Marker = Literal["dark", "coded", "long", "none"]
 
@@ -124,7 +124,8 @@ def _exposure_s(wish: CameraWish, fps: Fraction) -> float:
         if wish.exposure_s > period_s * (1 + 1e-6):
             raise UsageError(
                 f"`exposure_s` of {show_seconds(wish.exposure_s)} is longer than the frame period of "
-                f"{show_seconds(period_s)} at {show_rate(fps)}. Give at most that, or `shutter_deg` 360."
+                f"{show_seconds(period_s)} at {show_rate(fps)}. Give at most {show_seconds(no_more(period_s))}, or "
+                "`shutter_deg` 360."
             )
         return wish.exposure_s
     shutter_deg = 360.0 if wish.shutter_deg is None else wish.shutter_deg

@@ -1,6 +1,7 @@
 """Times, frame rates, and how many there are of something, as people write them."""
 
 from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 
 NTSC = Fraction(1000, 1001)
@@ -43,6 +44,24 @@ def show_seconds(seconds: float, *, figures: int = 4) -> str:
         return f"{seconds:.{figures}g} s"
     in_ms = abs(seconds) >= 1e-4 or seconds == 0
     return f"{seconds * 1e3:.{figures}g} ms" if in_ms else f"{seconds * 1e6:.{figures}g} us"
+
+
+def no_less(value: float, *, figures: int = 4) -> float:
+    """Return the least number of this many figures that is not below a value: what is advised as "at least".
+
+    >>> no_less(8.34250083, figures=6), no_less(0.0008)
+    (8.34251, 0.0008)
+    """
+    return float(Context(prec=figures, rounding=ROUND_CEILING).create_decimal(Decimal(repr(float(value)))))
+
+
+def no_more(value: float, *, figures: int = 4) -> float:
+    """Return the largest number of this many figures that is not above a value: what is advised as "at most".
+
+    >>> no_more(0.00088889), no_more(0.0008)
+    (0.0008888, 0.0008)
+    """
+    return float(Context(prec=figures, rounding=ROUND_FLOOR).create_decimal(Decimal(repr(float(value)))))
 
 
 def show_ppm(ppm: float) -> str:
