@@ -618,3 +618,14 @@ def test_where_a_shadow_ends_says_little_of_the_distance_around_it() -> None:
     costs, _ = swept_costs(ground, rig.lights, light, ground.depth_m.astype(np.float64), 1, noise=1e-4)
     beside, away = (costs[:, SIZE // 4, col].min() for col in (SIZE // 2 + 1, SIZE // 4))
     assert beside < away + 0.1
+
+
+@pytest.mark.parametrize("focal", ["[0, 0]", "[0.0, 500.0]", "[500.0, -500.0]"])
+def test_a_focal_length_that_is_none_is_refused(focal: str, tmp_path: Path) -> None:
+    """Of 0 it was divided by, and a negative one turns the picture over."""
+    path = tmp_path / "rig.toml"
+    light = '[[light]]\nname = "a"\nposition_m = [0.1, 0.0, 0.0]\n'
+    view = f"[camera]\nfocal_px = {focal}\nprincipal_px = [9.5, 9.5]\n"
+    path.write_text(f'schema = "psvideo-rig/1"\n{light}{view}')
+    with pytest.raises(PsvideoError, match=r"rig\.toml: key 'camera\.focal_px\[\d\]' is .*: expected greater than 0"):
+        ps.read_rig(path)

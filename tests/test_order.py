@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.irradiance.light_field import Points, light_vectors, points_on_plane
 from psvideo.model.marker import turned_slot
 from psvideo.model.plan import Plan
@@ -165,6 +166,22 @@ def test_the_light_of_near_lights_is_what_the_virtual_shoot_makes_of_them(make_p
         cosine = -(away / distance[:, None]) @ np.array(light.axis)
         want = 0.9 * cosine[:, None] ** 2 * away / distance[:, None] ** 3
         np.testing.assert_allclose(found[:, slot], want / plan.flashes[slot].duration_s * 0.0008, rtol=1e-6)
+
+
+def test_points_past_the_horizon_lie_as_far_before_the_camera_as_where_normals_are_solved(make_plan: PlanMaker) -> None:
+    """Rays above a floor's horizon meet it behind the camera: both follow it to a thousand times its nearest depth."""
+    plan = make_plan(lights=NAMES[:3], dark=False, width_px=24, height_px=40)
+    floor = (0.0, 0.8, 0.6, 1.0)
+    rig = replace(
+        near_ring(radius_m=0.6, anisotropy=0.0), plane=floor, focal_px=(16.0, 16.0), principal_px=(11.5, 19.5)
+    )
+    rows, cols = np.mgrid[0:40, 0:24]
+    points_m = points_on_plane(plan, rig, down=(rows.ravel() + 0.5) / 40, across=(cols.ravel() + 0.5) / 24)
+    past = np.array([points_m[0] @ floor[:3] + floor[3], points_m[-1] @ floor[:3] + floor[3]])
+    assert past[0] > 1.0, "the top row looks past the horizon"
+    assert past[1] == pytest.approx(0.0, abs=1e-9), "and the bottom row at the floor"
+    ground = ground_of(rig, height_px=40, width_px=24)
+    np.testing.assert_allclose(-points_m[:, 2], ground.depth_m.ravel(), rtol=1e-6)
 
 
 def random_rig(rng: np.random.Generator, kind: str, count: int) -> Rig:

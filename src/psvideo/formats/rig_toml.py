@@ -65,7 +65,7 @@ class _RigLight(Contract):
 
 
 class _View(Contract):
-    focal_px: Pair | None = None
+    focal_px: Annotated[list[Strength], Field(min_length=2, max_length=2)] | None = None
     principal_px: Pair | None = None
 
 

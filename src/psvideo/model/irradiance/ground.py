@@ -62,6 +62,24 @@ def inverse_depth(plane: tuple[float, float, float, float], x: Doubles, y: Doubl
     return towards / d if d else np.zeros_like(towards)
 
 
+def points_before(rig: Rig, *, height_px: int, width_px: int, col: Doubles, row: Doubles) -> Doubles:
+    """Return where rays through places (point,) of a picture meet the rig's plane, in metres, shape (point, 3).
+
+    Past the horizon they are as far away as ``ground_of`` takes them to be. Raises ValueError where the rig lacks the
+    camera or the plane.
+    """
+    if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
+        raise ValueError("a rig with camera and plane expected")
+    x, y = rays(rig.focal_px, rig.principal_px, col=col, row=row)
+    corners_x, corners_y = rays(
+        rig.focal_px, rig.principal_px, col=np.array([[0.0, width_px - 1.0]]), row=np.array([[0.0], [height_px - 1.0]])
+    )
+    nearest = inverse_depth(rig.plane, corners_x, corners_y).max()  # of all pixels: a plane's inverse depth is linear
+    inverse_m = np.maximum(inverse_depth(rig.plane, x, y), FARTHEST_SHARE * nearest)
+    points_m: Doubles = np.stack([x, y, -np.ones_like(x)], axis=1) / inverse_m[:, None]
+    return points_m
+
+
 def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.floating] | None = None) -> Ground:
     """Return the ground of a picture: on the rig's plane, and at the depth ``known_m`` (row, col) where that is > 0.
 

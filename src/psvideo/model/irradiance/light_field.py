@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles
-from psvideo.model.irradiance.ground import inverse_depth, rays
+from psvideo.model.irradiance.ground import points_before
 from psvideo.model.irradiance.intensity import measured_duration_s
 from psvideo.model.irradiance.near_light import is_near, near_vectors
 from psvideo.model.plan import Plan
@@ -54,11 +54,9 @@ def points_on_plane(plan: Plan, rig: Rig, *, down: Doubles, across: Doubles) -> 
     """Return where the rays through points of the picture meet the rig's plane, in metres, shape (point, 3)."""
     if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
         raise ValueError("near lights need the rig's camera and plane")
-    col = across * plan.camera.width_px - 0.5
-    row = down * plan.camera.height_px - 0.5
-    x, y = rays(rig.focal_px, rig.principal_px, col=col, row=row)
-    points: Doubles = np.stack([x, y, -np.ones_like(x)], axis=1) / inverse_depth(rig.plane, x, y)[:, None]
-    return points
+    width_px, height_px = plan.camera.width_px, plan.camera.height_px
+    col, row = across * width_px - 0.5, down * height_px - 0.5
+    return points_before(rig, height_px=height_px, width_px=width_px, col=col, row=row)
 
 
 def _strength(light: Light, points: Points) -> Doubles:
