@@ -48,6 +48,11 @@ class Around:
     before: Shot
     after: Shot
 
+    def share(self, time_s: float) -> float:
+        """Return how far the nearer of two shots is from an instant, as a share of what lies between them."""
+        spans_s = abs(time_s - self.before.time_s), abs(self.after.time_s - time_s)
+        return min(spans_s) / abs(self.after.time_s - self.before.time_s)
+
     def nearest(self, time_s: float) -> LightPlate:
         """Return the plate that is nearest in time, of those that are held."""
         held = [shot for shot in (self.before, self.after) if shot.plate is not None]

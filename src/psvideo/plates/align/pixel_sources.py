@@ -5,7 +5,7 @@ What was hidden in one of the plates is taken from the other. Blending by time a
 where a surface turns. Where nothing moves, or motion explains nothing better, the nearer plate is taken as it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -191,20 +191,24 @@ def _off_of_blend(plates: Compared, alike: Flags) -> Floats:
     return np.asarray(np.where(plain & ~alike, BLENDED_UNLIKE, np.sqrt(squares)), np.float32)
 
 
-def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> tuple[list[Codes8], Flags]:
+def without_doubtful(
+    shown: Sequence[Taken], motion: Followed, others: int, better: Callable[[Flags], Flags] | None = None
+) -> tuple[list[Codes8], Flags]:
     """Return the sources of all lights under which something moves, without what is doubtful where enough is sure; and
     where nothing is known, though it is shown as it is: more than half of many lights show that something moved, and no
     motion explains it.
 
-    ``others`` is the number of lights under which nothing moves.
+    ``others`` is the number of lights under which nothing moves. ``better`` says of the lights that are used, (light,
+    row, col) of ``shown``, where a normal of them is better than one of all; left out, it is everywhere.
     """
     sure = np.sum([one.sure for one in shown], axis=0, dtype=np.int16)
-    left_out, unknown = sure + others >= ENOUGH, np.zeros(sure.shape, np.bool_)
+    left_out, puzzling = sure + others >= ENOUGH, np.zeros(sure.shape, np.bool_)
     if len(shown) >= MANY:
         puzzling = ~motion.moves & (sure < min(len(shown) // 2, len(shown) - MANY + 1))
         left_out |= puzzling & (sure + others >= FEWEST)
-        unknown = puzzling & ~left_out
-    return [np.where(left_out & ~one.sure, np.uint8(NOWHERE), one.source) for one in shown], unknown
+    if better is not None:
+        left_out &= better(np.stack([one.sure | ~left_out for one in shown]))
+    return [np.where(left_out & ~one.sure, np.uint8(NOWHERE), one.source) for one in shown], puzzling & ~left_out
 
 
 def _shaded(before: Codes8, after: Codes8, window: tuple[int, int]) -> Flags:

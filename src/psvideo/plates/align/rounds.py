@@ -4,7 +4,7 @@ A round's flashes show different instants. Each light's plate at the wanted inst
 light around it, as soon as the second one is there; at the clip's ends, and beside a gap, from the two nearest ones.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from psvideo.plates.align.between import Ends, plate_at
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.doubt.unsure import UNKNOWN
+from psvideo.plates.align.left_out import AtInstant, better_without
 from psvideo.plates.align.light_history import Around, DueInstant, Held
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
@@ -195,7 +196,8 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     guesses = sources = [one.source for one in shown]
     unknown = np.zeros_like(motion.moves)
     if not instant.guessed:
-        sources, unknown = without_doubtful(shown, motion, len(held.lights) - len(lights))
+        better = _better_without(held, instant, dict(zip(lights, shown, strict=True)))
+        sources, unknown = without_doubtful(shown, motion, len(held.lights) - len(lights), better)
         still = _fitting_as_they_are(held, instant, dict(zip(lights, pairs, strict=True)), shown)
         if still.any():
             instant.motion = motion = motion.without(still)
@@ -208,6 +210,32 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
         _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion, held.put_by))
         instant.moving.remove(light)
         held.let_go()
+
+
+def _better_without(held: Held, instant: DueInstant, taken: dict[str, Taken]) -> Callable[[Flags], Flags] | None:
+    """Return what says of the lights that are used, (light, row, col) of those taken, where a normal of them and of
+    what stands is better than one of all; None where the lights do not tell."""
+    motion, lamps, lights = instant.motion, held.lamps, list[AtInstant]()
+    if lamps is None or motion is None:
+        return None
+    for light in held.lights:
+        sketch, shape = held.shots[light][instant.round].sketch, motion.moves.shape
+        if light in taken:
+            share = held.sure_around(light, instant).share(instant.time_s)
+            lights.append(AtInstant(shows=taken[light].shows, unsure=taken[light].unsure, share=share))
+        elif sketch is not None:
+            still = InstantSketch.standing(sketch, shape)
+            lights.append(AtInstant(shows=still, unsure=np.zeros(shape, np.float32), share=1.0))
+    if len(lights) < len(held.lights):
+        return None
+    places = [held.lights.index(light) for light in taken]
+
+    def better(used: Flags) -> Flags:
+        every = np.ones((len(lights), *used.shape[1:]), np.bool_)
+        every[places] = used
+        return better_without(lamps, lights, every)
+
+    return better
 
 
 def _fitting_as_they_are(held: Held, instant: DueInstant, pairs: dict[str, Pair], shown: Sequence[Taken]) -> Flags:
