@@ -137,7 +137,7 @@ class Held:
     def _look_for_drift(self, light: str, sketch: Sketch) -> None:
         """Hold a sketch against the first one of its block of rounds, from the second after that on."""
         if sketch.number % POOLED_ROUNDS == 0:
-            self.first[light] = replace(sketch)  # without the detail that the shot's will have
+            self.first[light] = sketch
         elif (first := self.first.get(light)) is not None and 1 < sketch.number - first.number < POOLED_ROUNDS:
             self.drift[light, sketch.number] = changed(first, evened(first, sketch))
 
@@ -238,8 +238,7 @@ class Held:
                 if number < oldest:
                     del shots[number]
                 elif shot.plate is not None and number not in near and not self._is_for_later(shot):
-                    sketch = None if shot.sketch is None else replace(shot.sketch)  # its detail goes with the plate
-                    shots[number] = replace(shot, plate=None, sketch=sketch)
+                    shots[number] = replace(shot, plate=None)
 
     def _rounds_of(self, light: str, instant: DueInstant) -> tuple[int, int]:
         """Return the rounds whose plates of a light an instant is made from; at the clip's end the first is enough."""

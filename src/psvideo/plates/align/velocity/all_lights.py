@@ -14,8 +14,8 @@ import numpy as np
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.correlation import displacements
-from psvideo.plates.align.velocity.detail import FINEST_PX, smoothed
-from psvideo.plates.align.velocity.flow import FINE_PIXELS, comparable, detail_in, flow_from, pixel_places
+from psvideo.plates.align.velocity.detail import FINEST_PX, detail_of, smoothed
+from psvideo.plates.align.velocity.flow import FINE_PIXELS, comparable, flow_from, pixel_places
 from psvideo.plates.align.velocity.followed import Pair, mean_over, odd_width
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
@@ -47,8 +47,7 @@ class AllLights:
         befores, afters = np.empty((2, len(pairs), *codes[0][0].shape), np.uint8)
 
         def sharpen(light: int, _: int) -> None:
-            pair, shown = pairs[light], codes[light]
-            befores[light], afters[light] = map(detail_in, (pair.before, pair.after), shown)
+            befores[light], afters[light] = map(detail_of, codes[light])
 
         over_ranges(sharpen, len(pairs), each=1)
         spans_s = [(time_s - pair.before.time_s, pair.after.time_s - time_s) for pair in pairs]

@@ -5,7 +5,6 @@ differ in what they show, so only plates of the same light are compared. Flow is
 whose codes follow the square root of light: photon noise is then the same everywhere. Their exposure is fixed.
 """
 
-import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
 from psvideo.model.arrays import Bytes, Codes8, Flags, Floats, Image
-from psvideo.plates.align.velocity.detail import detail_of
 from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
@@ -62,11 +60,6 @@ class Sketch:
     blocks: Floats
     white: float
     filled: Bytes | None = None
-
-    @functools.cached_property
-    def detail(self) -> Codes8:
-        """The detail of the codes: what follows one instant goes before the next."""
-        return detail_of(self.codes)
 
 
 def white_of(plate: LightPlate) -> float:
@@ -125,11 +118,6 @@ def comparable(before: Sketch, after: Sketch) -> tuple[Codes8, Codes8]:
     if (vague := vague_between(before.filled, after.filled)) is not None:
         other = np.where(vague, one, other)
     return one, other
-
-
-def detail_in(sketch: Sketch, comparable_codes: Codes8) -> Codes8:
-    """Return the detail of a sketch's codes as they became comparable with another's."""
-    return sketch.detail if comparable_codes is sketch.codes else detail_of(comparable_codes)
 
 
 def changed(before: Sketch, after: Sketch) -> Flags:
