@@ -119,7 +119,7 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
         likely_torn_deg=np.sqrt(np.maximum(likely, 0)),
         noise_deg=noise_deg,
         lost_deg=noise_deg * np.sqrt(wider - 1),
-        hidden=of_signs.hidden_by(lights) / of_signs.hidden_by(of_signs.ENOUGH_LIGHTS),
+        hidden=of_signs.hidden_of(one.lit, plain=plain),
         plain=plain,
     )
 
@@ -152,13 +152,14 @@ def torn_in_numpy(points: ThinSurface) -> np.ndarray:
 
 def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
     def of(misfit_deg: np.ndarray, torn_deg: np.ndarray) -> np.ndarray:
-        counts = how.misfit_deg * (how.plain if signs.plain else signs.hidden**how.few_power)
+        counts = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
         misfit = counts * misfit_deg ** (1 + how.misfit_power)
         misfit /= misfit_deg + how.little_deg
         misfit -= signs.uneven * np.maximum(misfit - misfit_deg, 0)
         both = np.hypot(np.hypot(misfit, how.indirect * signs.indirect_deg), signs.unchecked_deg)
         most_torn = how.torn_beside * both + how.torn_alone_deg + signs.unchecked_deg
-        return np.asarray(both + how.torn * np.minimum(torn_deg, most_torn))
+        limited = np.minimum(torn_deg, most_torn)
+        return np.asarray(both + how.torn * np.maximum(limited, signs.torn_share * torn_deg))
 
     sure, likely = of(signs.misfit_deg, signs.torn_deg), of(signs.likely_misfit_deg, signs.likely_torn_deg)
     least = np.maximum(likely, how.by_model * signs.by_model_deg)
@@ -178,8 +179,11 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
         assert name == "uneven" or seen[points.known].max() > 0.05, name
     for how in (Doubting(), Doubting(misfit_power=0.3, torn=1.0)):
         for unchecked in (0.0, np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)):
-            claimed = doubt_deg(replace(found, unchecked_deg=unchecked, by_model_deg=3 * unchecked), how=how)
-            expected = doubt_in_numpy(replace(true, unchecked_deg=unchecked, by_model_deg=3 * unchecked), how)
+            counted, share = 3 * unchecked, np.asarray(unchecked, np.float32) / np.float32(9)
+            signs, of_numpy = (
+                replace(each, unchecked_deg=unchecked, by_model_deg=counted, torn_share=share) for each in (found, true)
+            )
+            claimed, expected = doubt_deg(signs, how=how), doubt_in_numpy(of_numpy, how)
             assert claimed == pytest.approx(expected, rel=2e-3, abs=5e-3)
 
 

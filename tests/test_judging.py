@@ -25,7 +25,7 @@ from psvideo.solve.normals.trust.judging import judged as judged_by_signs
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.normals.trust.torn import torn_angles_deg
-from psvideo.solve.normals.trust.unchecked import unchecked_deg
+from psvideo.solve.normals.trust.unchecked import turned_unseen, unchecked_deg
 
 SIZE = 96
 COLOUR = np.array([0.5, 0.4, 0.3])
@@ -327,6 +327,31 @@ def test_errors_count_what_cannot_be_checked_under_three_lights_alone(lights: in
         assert (claimed > by_signs + 2).all()
     else:
         assert np.array_equal(claimed, by_signs)
+
+
+def test_lights_that_stand_together_turn_normals_unseen_and_a_ring_does_not() -> None:
+    def unseen(ways: np.ndarray, strengths: tuple[float, ...] = (1, 1, 1, 1)) -> float:
+        rays = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+        return turned_unseen(Illumination(directions=rays, intensities=np.array(strengths)[:, None]))
+
+    together = np.array([[0, 0.4, 1], [0.1, 0.4, 1], [0.5, 0, 1], [-0.1, -0.4, 1]])  # two of four nearly alike
+    assert unseen(ring(4, 35)) < 4 < 9 < unseen(together)
+    assert unseen(ring(8, 35), (1,) * 8) < unseen(ring(5, 35), (1,) * 5) < unseen(ring(4, 35))
+    assert unseen(ring(4, 35)) < unseen(ring(4, 20))
+    assert unseen(ring(3, 35), (1, 1, 1)) == np.inf
+
+
+def test_errors_count_more_where_four_lights_check_each_other_less() -> None:
+    normals, inside = shapes()[1][1:]
+    together = np.array([[0, 0.4, 1], [0.1, 0.4, 1], [0.5, 0, 1], [-0.1, -0.4, 1]])
+    ratios = []
+    for ways in (ring(4, 35), together / np.linalg.norm(together, axis=1, keepdims=True)):
+        case = shot(normals, inside, ways, gloss=0.1)
+        surface = Solving(error=True).solve(case.plates, case.lit, mask=inside)
+        assert surface.error_deg is not None
+        ratios.append(np.median(surface.error_deg[inside]) / np.median(angles_deg(surface.normals, normals)[inside]))
+    assert ratios[0] < 2.2 * ratios[1]
+    assert min(ratios) > 0.75
 
 
 def test_flatter_lights_leave_more_unchecked() -> None:

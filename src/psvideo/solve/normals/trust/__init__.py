@@ -6,5 +6,6 @@ to no surface; ``indirect`` (light from other surfaces, and how much farther noi
 looked for while the plates are being solved), ``near_spread`` (near lights, whose directions depend on the
 distance), ``moving_doubt`` (plates that do not match after alignment), ``few_checked`` (by how much a model of the
 subject would turn normals under four and five lights), and ``unchecked`` (what three lights leave of real surfaces, and
-show hardly anywhere). ``doubting`` says how much they count; its loops are in ``doubting_kernel``.
+show hardly anywhere; and how well few lights check each other). ``doubting`` says how much they count; its loops
+are in ``doubting_kernel``.
 """

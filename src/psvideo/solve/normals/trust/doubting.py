@@ -26,8 +26,8 @@ class Doubting:
     indirect: how much of the angle counts by which light from around would turn the normal.
     torn, torn_beside, torn_alone_deg: how much more it is for each degree by which normals belong to no surface; these
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
-        there are more, where normals are as good as elsewhere. Under three lights, where nothing else speaks, they
-        count without that limit (``unchecked.py``).
+        there are more, where normals are as good as elsewhere. Under lights that can hardly be held against each other
+        nothing else speaks, and they count without that limit (``unchecked.py``).
     by_model: the whole error is at least this share of the angle by which the subject's model would turn the normal.
 
     Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
@@ -57,19 +57,18 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     """
     from psvideo.solve.normals.trust.doubting_kernel import fill_doubt
 
-    counts = how.misfit_deg * (how.plain if signs.plain else signs.hidden**how.few_power)
-    share, alone_deg = signs.torn_share, how.torn_alone_deg
-    torn_deg, likely_torn_deg = signs.torn_deg, signs.likely_torn_deg
-    if share is not None:
-        torn_deg, likely_torn_deg, alone_deg = share * torn_deg, share * likely_torn_deg, np.inf
-    factors = (counts, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, alone_deg)
+    counts = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
+    factors = (counts, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
     planes = np.stack(
         [
-            *(signs.misfit_deg, torn_deg, signs.likely_misfit_deg, likely_torn_deg),
+            *(signs.misfit_deg, signs.torn_deg, signs.likely_misfit_deg, signs.likely_torn_deg),
             *(signs.indirect_deg, signs.lost_deg, signs.noise_deg),
             *(
                 np.broadcast_to(np.float32(one), signs.misfit_deg.shape)
-                for one in (signs.uneven, signs.unchecked_deg, np.float32(how.by_model) * signs.by_model_deg)
+                for one in (
+                    *(signs.uneven, signs.unchecked_deg),
+                    *(np.float32(how.by_model) * signs.by_model_deg, signs.torn_share),
+                )
             ),
         ]
     )

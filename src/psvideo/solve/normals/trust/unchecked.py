@@ -44,11 +44,23 @@ gives more than the second does. (Light from around is up to 0.2 in wide creases
 TORN_IN_LIGHT = np.float32(3)
 """Where all lights reach, normals that belong to no surface count so many times less: creases and outlines make such as
 well, most of them in small pictures."""
+SEEN, UNSEEN = 5.0, 9.0
+"""Where a matte surface's light goes with a little of the cosine's square as well, normals turn by so many times what
+all residuals together show of it: lights up to the first check each other, from the second on hardly. (Of 200 sets of
+4 to 8 lights on five photographed and rendered subjects, those that turn less than 2.7 times left 0.5 % of what is
+trusted over 10 degrees, up to 3.7 times 1.9 %, beyond 2.8 %. Five lights on a ring, 35 degrees from the axis: 2.6; four
+within one quarter: 13.)"""
+NORMALS, FACING, LIT = 600, 0.35, 0.12
+"""That is looked at in so many directions that face the camera so much, where all lights shine at such a cosine."""
 
 
-def torn_share(points: ThinSurface, lit: Illumination) -> Floats:
-    """Return by how much of themselves normals that belong to no surface count at every point, (row, col): wholly where
-    a light may not reach, less where all do."""
+def torn_share(points: ThinSurface, lit: Illumination) -> Floats | float:
+    """Return by how much of themselves normals that belong to no surface count at every point, (row, col), whatever
+    else shows: wholly where a light may not reach, less where all do, and not at all under lights that check each
+    other."""
+    unseen = min(max((turned_unseen(lit) - SEEN) / (UNSEEN - SEEN), 0.0), 1.0)
+    if not unseen:
+        return 0.0
     if lit.near is None:
         towards = lit.directions.astype(np.float32)[..., None, None]
     else:
@@ -59,4 +71,27 @@ def torn_share(points: ThinSurface, lit: Illumination) -> Floats:
     cosines = (towards * points.planes).sum(axis=1)
     mean = np.maximum(cosines, 0).mean(axis=0)
     reaches = (cosines.min(axis=0) / np.maximum(mean, np.float32(1e-6)) - DIM) / (BRIGHT - DIM)
-    return np.asarray(1 / (1 + (TORN_IN_LIGHT - 1) * np.clip(reaches, 0, 1)), np.float32)
+    return np.asarray(np.float32(unseen) / (1 + (TORN_IN_LIGHT - 1) * np.clip(reaches, 0, 1)), np.float32)
+
+
+def turned_unseen(lit: Illumination) -> float:
+    """Return by how many times more than all residuals together a surface that is not quite matte turns normals, root
+    mean squares over normals that all lights reach; infinite where nothing is left over, 0 where no normal is so lit.
+    Near lights count as they stand in the middle of the picture."""
+    if len(lit.directions) <= ALL_EXPLAINED:
+        return float("inf")
+    strengths = lit.intensities.mean(axis=1) / lit.intensities.mean()
+    place = (np.arange(NORMALS) + 0.5) / NORMALS
+    z, around = 1 - place * (1 - FACING), np.pi * (1 + 5**0.5) * np.arange(NORMALS)  # evenly over a cap of the sphere
+    across = np.sqrt(1 - z * z)
+    normals = np.stack([across * np.cos(around), across * np.sin(around), z], axis=-1)
+    cosines = normals @ lit.directions.T
+    lit_by_all = (cosines > LIT).all(axis=1)
+    if not lit_by_all.any():
+        return 0.0
+    normals, added = normals[lit_by_all], cosines[lit_by_all] ** 2 * strengths
+    matrix = lit.directions * strengths[:, None]
+    g = added @ np.linalg.pinv(matrix).T
+    left = added - g @ matrix.T
+    g -= (g * normals).sum(axis=1, keepdims=True) * normals
+    return float(np.sqrt((g**2).sum() / max(float((left**2).sum()), 1e-12)))
