@@ -250,3 +250,17 @@ def test_a_black_frame_is_named_and_spoils_what_it_saw_and_no_light(
     assert not any("never fired" in note for note in timing.notes)
     assert not timing.dropped_frames
     assert not timing.repeated_frames
+
+
+def test_beside_missing_flashes_those_of_which_little_was_seen_may_be_missing_too(make_plan: PlanMaker) -> None:
+    """Of dead flashes that fell between two exposures some stayed complete, as those of their lights before and after
+    fired."""
+    plan = make_plan(height_px=48, width_px=12, shutter=0.5, readout=0.55)
+    skipped = range(40, 46)
+    shot = shot_of(plan, lambda flash: flash.index in skipped)
+    timing = timing_of(plan, shot)
+    dead_s = np.array([one.start_s for one in shot.flashes if one.index in skipped and one.lights])
+    complete_s = np.array([one.start_s for one in timing.flashes if one.complete and one.lights])
+    assert np.abs(complete_s[:, None] - dead_s).min() > 5 * plan.camera.row_time_s
+    fired = [one for one in inside(plan, shot) if one.index not in skipped]
+    assert len(complete_s) > 0.95 * len(fired)

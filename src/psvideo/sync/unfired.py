@@ -73,9 +73,9 @@ def unfired_of(
     lights' names.
 
     A flash of which too little was seen, as below 360 degrees most that fall between two exposures, is one where those
-    of its light before and after are, and may be one where one of them is. ``breaks``: whether the strobe began at the
-    first frame, or stopped at the last, or some frames off: flashes beyond all that are seen to give light may not
-    have fired.
+    of its light before and after are, and may be one where one of them is, or the next one of any light on either side
+    of which enough was seen. ``breaks``: whether the strobe began at the first frame, or stopped at the last, or some
+    frames off: flashes beyond all that are seen to give light may not have fired.
 
     One light's flashes, with those of others between them, under ``breaks`` (True, False). What they give is 1, 0 or
     not known; ``told`` are those of which it is::
@@ -102,10 +102,23 @@ def unfired_of(
             dead = [bool(off[k]) for k in around if k is not None]
             if any(dead):
                 (never if all(dead) else beside).add(lit[n].index)
+    beside |= {lit[n].index for n in _beside_off(off, told)} - never
     shows = np.flatnonzero(gives)
     early, late = (lit[: shows[0]], lit[shows[-1] + 1 :]) if len(shows) else ([], [])
     beside.update(flash.index for there, some in zip(breaks, (early, late), strict=True) if there for flash in some)
     return Unfired(never=frozenset(never - beside), beside=frozenset(beside))
+
+
+def _beside_off(off: Mask, told: Mask) -> Integers:
+    """Return the flashes of which it is not ``told`` whether they fired, where the nearest of which it is, on either
+    side, did not: several may have been missing in a row."""
+    known, unknown = np.flatnonzero(told), np.flatnonzero(~told)
+    if not len(known):
+        return unknown[:0]
+    behind = np.searchsorted(known, unknown)
+    before, after = known[np.maximum(behind - 1, 0)], known[np.minimum(behind, len(known) - 1)]
+    found: Integers = unknown[off[before] | off[after]]
+    return found
 
 
 def incomplete(flashes: Sequence[Flash], those: frozenset[int]) -> tuple[Flash, ...]:
