@@ -149,7 +149,7 @@ def _cheapest(table: Doubles, twins: Twins, sign: int) -> Integers:
     extras = np.arange(LEAST, MOST + 1)
     step = extras[None, :] - extras[:, None]  # from the row's state to the column's
     usual = np.where(step == 0, 0.0, np.where(step < -1, np.inf, JUMP_COST + 0.05 * np.abs(step)))
-    beside = _alike_beside(twins.alike, sign)
+    beside = _stood_in(twins, sign)
     cost = np.where(extras == 0, 0.0, np.inf)
     back = np.zeros(table.shape, np.int64)
     for n in range(len(table)):
@@ -169,17 +169,18 @@ def _cheapest(table: Doubles, twins: Twins, sign: int) -> Integers:
     return course
 
 
-def _alike_beside(alike: Mask, sign: int) -> Integers:
-    """Return how many frames in a row just behind each one (ahead of it where ``sign`` is -1) are alike, (frame,)."""
-    count = np.zeros(len(alike), np.int64)
-    along = alike if sign > 0 else alike[::-1]
+def _stood_in(twins: Twins, sign: int) -> Integers:
+    """Return for how many frames those just behind each one (ahead of it where ``sign`` is -1) may stand in, (frame,):
+    all of a run that are lit, or one in the dark, where several look alike by themselves."""
+    count = np.zeros(len(twins.alike), np.int64)
+    alike, lit = twins.turned(sign)
     for n in range(1, len(alike)):
-        count[n] = count[n - 1] + 1 if along[n - 1] else 0
+        count[n] = max(count[n - 1] + 1 if lit[n - 1] else 0, int(alike[n - 1]))
     return count[::sign]
 
 
 def _repeats_alone(course: Integers, twins: Twins, sign: int) -> bool:
     """Return whether a course is nothing but lit frames that stand in for others."""
-    steps, beside = np.diff(course, prepend=0), _alike_beside(twins.alike, sign)
+    steps, beside = np.diff(course, prepend=0), _stood_in(twins, sign)
     told = np.where(twins.alike, twins.lit & (steps == -1), (steps >= 0) & (steps <= beside))
     return bool(twins.alike.any() and told.all() and course[-1] == 0)
