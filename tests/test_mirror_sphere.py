@@ -15,7 +15,7 @@ from picture_file import read_picture
 
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
-from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights, check_enough
 from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
@@ -220,6 +220,35 @@ def test_a_matte_sphere_is_refused_with_what_to_do() -> None:
     sightings = sight_spheres([light_pictures(list(DIRECTIONS), images)], Looking(), where="ball")
     with pytest.raises(PsvideoError, match="matte-sphere"):
         calibrate_lights(sightings)
+
+
+@pytest.mark.parametrize(("lights", "lit", "refused"), [(4, 2, True), (4, 3, False), (3, 1, True), (2, 1, False)])
+def test_a_sphere_on_which_few_of_the_lights_show_gives_no_rig(lights: int, lit: int, refused: bool) -> None:
+    lamps = {name: lamp if n < lit else OFF for n, (name, lamp) in enumerate(list(DISTANT.items())[:lights])}
+    sightings = sight_spheres([shoot(Lens(width=300, height=300), [ball_at(0)], lamps)], Looking(), where="ball")
+    found = calibrate_lights(sightings)
+    assert len(found.rig.lights) == lit
+    if not refused:
+        check_enough(found)
+        return
+    with pytest.raises(PsvideoError, match=rf"only {lit} of {lights} lights .*no highlight.*matte-sphere"):
+        check_enough(found)
+
+
+def test_the_command_writes_no_rig_of_one_light_of_three_and_a_picture_of_what_was_looked_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = tmp_path / "stills", tmp_path / "rig.toml"
+    folder.mkdir()
+    for n, (name, lamp) in enumerate(list(DISTANT.items())[:3]):
+        lit = [] if n else [lamp]
+        picture = photograph(Lens(width=300, height=300), [ball_at(0)], lit or [OFF], noise=0.002, seed=n)
+        cv2.imwrite(str(folder / f"{name}.png"), np.round(picture * 65535).astype(np.uint16))
+    assert (
+        main(["calibrate", "mirror-sphere", str(folder), "-o", str(out), "--focal-mm", "54", "--sensor-mm", "18"]) == 1
+    )
+    assert "only 1 of 3 lights" in capsys.readouterr().err
+    assert [path.suffix for path in tmp_path.iterdir() if path.is_file()] == [".png"]
 
 
 @pytest.fixture(scope="module")

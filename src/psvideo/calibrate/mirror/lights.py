@@ -16,6 +16,7 @@ from psvideo.calibrate.mirror.mirror_doubts import doubts_of
 from psvideo.calibrate.mirror.sighting import Highlight, Sighting, cut_differently, lacking_for_positions
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
+from psvideo.model.rig import LEAST_LIGHTS
 
 DISAGREE_DEG = 10.0
 """Directions from two spheres that differ by more, and do not meet in a point, cannot both be right."""
@@ -35,15 +36,30 @@ def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = 
     names = list(dict.fromkeys(one.light for sighting in sightings for one in sighting.highlights))
     lights = tuple(_measured(name, sightings, known_m) for name in names)
     if all(light.fault for light in lights):
-        reasons = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
-        told = next((f"{one.doubt.partition('. ')[0]}; " for one in sightings if one.doubt), "")
-        raise PsvideoError(
-            f"{sightings[0].where}: no light could be measured on the sphere ({told}{reasons}). Expected a small "
-            "bright highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. "
-            "Look at where the sphere was taken to be, and mark it with `circle` where that was wrong."
-        )
+        raise PsvideoError(_few(lights, sightings))
     doubts = doubts_of(lights, sightings, radius_m=radius_m)
     return MirrorCalibration(lights=lights, sightings=tuple(sightings), warnings=doubts)
+
+
+def check_enough(found: MirrorCalibration) -> None:
+    """Raise PsvideoError where fewer than half of the lights were measured, or fewer than the three that normals need,
+    though so many were shown: then what is there is hardly a mirror, and its highlights are chance."""
+    measured = sum(not light.fault for light in found.lights)
+    if 2 * measured < len(found.lights) or measured < LEAST_LIGHTS <= len(found.lights):
+        raise PsvideoError(_few(found.lights, found.sightings))
+
+
+def _few(lights: Sequence[MeasuredLight], sightings: Sequence[Sighting]) -> str:
+    lost = [light for light in lights if light.fault]
+    measured = len(lights) - len(lost)
+    reasons = "; ".join(f"{light.name}: {light.fault}" for light in lost[:3])
+    told = next((f"{one.doubt.partition('. ')[0]}; " for one in sightings if one.doubt), "")
+    what = f"only {measured} of {len(lights)} lights" if measured else "no light"
+    return (
+        f"{sightings[0].where}: {what} could be measured on the sphere ({told}{reasons}). Expected a small bright "
+        "highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. Look at "
+        "where the sphere was taken to be, and mark it with `circle` where that was wrong."
+    )
 
 
 def _measured(name: str, sightings: Sequence[Sighting], radius_m: float | None) -> MeasuredLight:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import read_picture
-from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights, check_enough
 from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
@@ -55,7 +55,8 @@ def mirror_sphere(
     - ``radius_mm``: the spheres' radius, 1 to 1000: with two or more, near lights get positions.
 
     Raises UsageError where parameters do not fit together or an output exists, and PsvideoError where no sphere is
-    found (the picture shows what was looked at) or nothing can be measured.
+    found, fewer than half of the lights are measured, or fewer than three of three and more (a picture shows what was
+    looked at), or nothing can be measured.
     """
     rig_path = rig_out(out, force=force)
     picture, of_failure = picture_beside(rig_path, force=force), picture_of_failure(rig_path)
@@ -69,6 +70,11 @@ def mirror_sphere(
         write_png(of_failure, faulty_picture(fault.picture))
         raise PsvideoError(f"{fault} See {of_failure}.") from None
     found = calibrate_lights(sightings, radius_m=radius_m)
+    try:
+        check_enough(found)
+    except PsvideoError as fault:
+        write_png(of_failure, sphere_picture(found))
+        raise PsvideoError(f"{fault} See {of_failure}.") from None
     write_png(picture, sphere_picture(found))
     write_text(rig_path, format_rig(found.rig))
     for warning in found.warnings:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.calibrate.light_files import pictures_in
-from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights, check_enough
 from psvideo.calibrate.mirror.sighting import Sighting, cut_differently, sight_spheres, size_px
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_places import Place, grouped_pictures
@@ -73,12 +73,13 @@ def sphere_lights(
     """Measure the lights on mirror spheres, one folder of pictures for each place; near where radius and lens say so.
 
     With near lights the surface is taken to be as far away as the spheres. Raises PsvideoError where no sphere is
-    found, one is cut off, or no light is measured.
+    found, one is cut off, or too few of the lights are measured.
     """
     places = grouped_pictures(spheres)
     looking, notes = _through_its_lens(looking, places)
     sightings = _sighted(places, looking, transfer=transfer, watch=watch, caller=caller)
     found = calibrate_lights(sightings, radius_m=radius_m)
+    check_enough(found)
     rig = found.rig
     if any(light.position_m is not None for light in rig.lights):
         rig = replace(rig, plane=plane_of(sightings, radius_m or 0.0))

@@ -82,7 +82,8 @@ def describe(found: MirrorCalibration) -> str:
         )
     lines += [_line(light) for light in found.lights]
     lines.append(
-        "Intensities are 1 for all lights: a mirror's highlights clip. A matte sphere or a flat field measures them."
+        "Intensities are 1 for all lights, which is not measured: a mirror's highlights clip. Next, film a white card "
+        "in the same place: psvideo calibrate flat-field, with this rig."
     )
     return "\n".join(lines)
 
