@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.as_they_are import MATTE, Lamps
+from psvideo.plates.align.as_they_are_kernel import FLAT
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.velocity.brightness import light_of
 
@@ -47,16 +48,19 @@ def better_without(lamps: Lamps, lights: Sequence[AtInstant], used: Flags) -> Fl
         return better
     some = used[:, rows, cols]
     squares = np.stack([light.squares(rows, cols, own) for light, own in zip(lights, some, strict=True)])
-    sets, which = np.unique(some, axis=1, return_inverse=True)
-    spread = np.stack([_spread(lamps, chosen) for chosen in sets.T])
-    few = (spread[which.ravel()].T * squares).sum(axis=0)
-    better[rows, cols] = few < _spread(lamps, np.ones(len(used), np.bool_)) @ squares
+    _, firsts, which = np.unique(np.packbits(some, axis=0), axis=1, return_index=True, return_inverse=True)
+    few = (_spread(lamps, some[:, firsts])[:, which.ravel()] * squares).sum(axis=0)
+    every = (_spread(lamps, np.ones((len(used), 1), np.bool_)) * squares).sum(axis=0)
+    better[rows, cols] = few < every
     return better
 
 
-def _spread(lamps: Lamps, chosen: Flags) -> Floats:
-    """Return by how much the square of each light's error counts in that of a normal of the chosen lights, (light,)."""
-    matrix = lamps.matrix * chosen[:, None]
-    if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
-        return np.full(len(chosen), NO_NORMAL, np.float32)
-    return np.asarray(np.square(np.linalg.pinv(matrix)).sum(axis=0), np.float32)
+def _spread(lamps: Lamps, sets: Flags) -> Floats:
+    """Return by how much the square of each light's error counts in that of a normal of a set of lights; both are
+    (light, set)."""
+    squares = np.einsum("ls,li,lj->sij", sets, lamps.matrix, lamps.matrix)
+    flat = np.linalg.det(squares) <= FLAT * (np.trace(squares, axis1=1, axis2=2) / 3) ** 3
+    squares[flat] = np.eye(3)
+    pulls = np.linalg.inv(squares) @ lamps.matrix.T
+    spread = np.square(pulls).sum(axis=1).T * sets
+    return np.asarray(np.where(flat, NO_NORMAL, spread), np.float32)
