@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from lit_ball import LIT_BALL
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import read_frames
-from psvideo.report.judge.of_saturation import hidden_saturation
+from psvideo.report.judge.of_saturation import below_black, hidden_saturation
 from psvideo.runs.steps.saturation import saturation_of
 from psvideo.synth.shoot import shoot
 
@@ -75,6 +76,34 @@ def test_a_sensor_that_saturates_where_the_plan_does_not_say_is_named_with_its_c
 def test_light_that_is_not_clipped_ends_at_no_level(tmp_path: Path) -> None:
     clip = filmed(tmp_path, intensity=0.9)
     assert saturation_of(ps.open_take(clip)) is None
+
+
+def test_codes_that_lie_low_in_their_files_are_not_called_dark(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Twelve bits in sixteen, without white_level: "open the aperture by 12 stops", and 59 % passed as valid."""
+    clip = filmed(tmp_path, intensity=0.9)
+    assert saturation_of(ps.open_take(clip)) is None
+    for frame in clip.rglob("*.png"):
+        codes = cv2.imread(str(frame), cv2.IMREAD_UNCHANGED)
+        assert codes is not None
+        cv2.imwrite(str(frame), codes // 16)
+    assert main(["check", str(clip)]) == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Light lies below black" in told
+    assert "write white_level = 4095" in told
+    assert "aperture" not in told
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_black_pictures_lie_on_both_sides_of_black(tmp_path: Path, seed: int) -> None:
+    clip = ps.open_take(filmed(tmp_path, intensity=0.9)).clip
+    noise = np.random.default_rng(seed).normal(0, 1e-4, (6, 60, 80)).astype(np.float32)
+    assert below_black(list(noise), clip) is None
+    assert below_black(list(noise - np.float32(1e-3)), clip) is not None
+    lit = noise - np.float32(1e-3)
+    lit[3, :20] += 0.01  # one frame is lit
+    assert below_black(list(lit), clip) is None
 
 
 Lit = NDArray[np.float32]

@@ -136,7 +136,10 @@ def judged_take(
         except NoStrobeError as fault:
             if too_short(clip.plan, window):
                 raise
-            lines: tuple[Judgement, ...] = (_unseen(str(fault)), exposure_of_frames(_light_of(take, EXPOSED_FRAMES)))
+            lines: tuple[Judgement, ...] = (
+                _unseen(str(fault)),
+                saturation_of(take) or exposure_of_frames(_light_of(take, EXPOSED_FRAMES)),
+            )
             notes: tuple[str, ...] = ()
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)

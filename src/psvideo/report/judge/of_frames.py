@@ -53,7 +53,8 @@ def exposure_of_frames(frames: Sequence[FrameLight]) -> Judgement:
 
 def later_frames(early: Sequence[FrameLight], late: Sequence[FrameLight]) -> Judgement:
     """Judge whether frames from the rest of a take are as bright as those from its start; at least one of each."""
-    ratio = max(frame.top for frame in late) / max(*(frame.top for frame in early), 1e-6)
+    first, then = (max(1e-6, *(frame.top for frame in frames)) for frames in (early, late))
+    ratio = then / first
     if DARKER < ratio < BRIGHTER:
         return Judgement(subject="later", grade="good", found="Light and exposure stay through the take.")
     change = abs(np.log2(max(ratio, 1e-6)))

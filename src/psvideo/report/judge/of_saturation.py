@@ -1,14 +1,18 @@
-"""Judgement on a sensor that saturates below the largest code, where the plan does not say so."""
+"""Judgements on codes that the plan misreads: a sensor that saturates below the largest code, light below black."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip.linear import DEPTHS
 from psvideo.clip.record import Clip
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.hidden_level import hidden_level
+
+BRIGHTEST = 0.999
+"""Of a frame's samples, this share is darker than its brightest parts."""
 
 
 def hidden_saturation(frames: Sequence[NDArray[np.float32]], clip: Clip) -> Judgement | None:
@@ -25,6 +29,33 @@ def hidden_saturation(frames: Sequence[NDArray[np.float32]], clip: Clip) -> Judg
         "not say so, and what is clipped counts as measured.",
         advice=f"Write white_level = {code} into the plan's [camera] table, and look again.",
     )
+
+
+def below_black(frames: Sequence[NDArray[np.float32]], clip: Clip) -> Judgement | None:
+    """Judge whether frames, linear light by the clip's plan, lie below the curve's black, also where they are lit; None
+    where not. Noise of a black picture lies on both sides of it."""
+    top = max((float(np.nanquantile(frame, BRIGHTEST)) for frame in frames), default=0.0)
+    if top >= 0:
+        return None
+    encoding, bits = clip.plan.camera.encoding, clip.header.bits or 0
+    return Judgement(
+        subject="exposure",
+        grade="bad",
+        found=f"Light lies below black, also in the brightest parts: by transfer = {encoding.transfer!r} hardly any "
+        f"code of these {bits}-bit files stands for light at all, and normals of them mean nothing.",
+        advice="Write into the plan's [camera] table how the files were coded: white_level is not counted in the "
+        f"files' codes{_fewer_bits(top, clip)}, or the curve is another.",
+    )
+
+
+def _fewer_bits(top: float, clip: Clip) -> str:
+    """Say which white level the codes seem to be counted against; nothing where the plan gives another."""
+    encoding, bits = clip.plan.camera.encoding, clip.header.bits or 0
+    code = _signal(encoding.transfer, top) * (2**bits - 1)
+    depth = next((depth for depth in DEPTHS if depth < bits and code < 2**depth), None)
+    if depth is None or encoding.white_level is not None:
+        return ""
+    return f" (where they hold {depth} bits in {bits}, write white_level = {2**depth - 1})"
 
 
 def _signal(transfer: str, light: float) -> float:

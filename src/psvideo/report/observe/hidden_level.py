@@ -59,6 +59,11 @@ def may_hide(clip: Clip) -> bool:
     return records and encoding.white_level is None and clip.header.bits is not None
 
 
+def may_lie_below(clip: Clip) -> bool:
+    """Return whether a clip's codes may all stand for less than no light: a logarithm's black lies far above code 0."""
+    return clip.header.bits is not None and find_curve(clip.plan.camera.encoding.transfer).name not in DISPLAYED
+
+
 def numbers_to_look_at(clip: Clip, numbers: Sequence[int]) -> tuple[int, ...]:
     """Return which of a clip's frames to look at, from the middle of those that are used."""
     plan = clip.plan
