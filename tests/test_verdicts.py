@@ -18,6 +18,7 @@ from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Misfit, Surface
 from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.model.turn import CLOCKWISE, UPRIGHT
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
@@ -1212,6 +1213,16 @@ def test_where_a_light_is_known_to_be_weaker_than_the_rig_says_no_turned_rig_is_
     assert any("mirrored" in line.found for line in rig_of(one)) is not weak
     assert ("swung to the left or right" in said) is not weak
     assert ("'light1'" in said) is weak
+
+
+@pytest.mark.parametrize("lights", [3, 4])
+def test_a_rig_that_is_turned_beside_a_clip_that_is_turned_too_is_told_of_it(lights: int) -> None:
+    for turn in (UPRIGHT, CLOCKWISE):
+        one = Footage(lights=lights, turned_deg=90, solved=True, shape="waves").observed(0)
+        one.turn = turn
+        said = " ".join(line.found for line in rig_but_leaning(one))
+        assert "directions are mirrored or turned" in said
+        assert ("turned by 90 degrees clockwise" in said) is (turn == CLOCKWISE)
 
 
 def test_under_three_lights_strengths_may_be_why_normals_lean() -> None:

@@ -75,16 +75,26 @@ def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
             subject="rig",
             grade=grade,
             found=f"{cannot}: directions are mirrored or turned, lights exchanged, or much of the surface shines or "
-            "lies in shadow, which three lights do not tell apart.",
+            f"lies in shadow, which three lights do not tell apart.{_as_it_is_seen(observed)}",
             advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
             "lights as the plan does. If it does, add lights.",
         )
     return Judgement(
         subject="rig",
         grade=grade,
-        found=f"{cannot}: directions are mirrored or turned, or lights exchanged.",
+        found=f"{cannot}: directions are mirrored or turned, or lights exchanged.{_as_it_is_seen(observed)}",
         advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
         "lights as the plan does; calibrate again if anything was moved.",
+    )
+
+
+def _as_it_is_seen(observed: Observed) -> str:
+    """Return what is to be thought of where a clip's pictures were turned: a rig may be in the sensor's axes."""
+    if observed.turn.is_none:
+        return ""
+    return (
+        f" The file wants its pictures {observed.turn}, and so they are: a rig that was measured on pictures as the "
+        "sensor lies has its axes turned."
     )
 
 
@@ -97,7 +107,7 @@ def facing_away(observed: Observed) -> Judgement | None:
         subject="rig",
         grade="bad",
         found=f"{100 * share:.0f} % of the normals face away from the camera, which sees none of such a surface: "
-        "directions or strengths of the lights are wrong.",
+        f"directions or strengths of the lights are wrong.{_as_it_is_seen(observed)}",
         advice="Use the rig file of this set-up; check that lights have the same names in plan and rig, and that each "
         "gives what the rig says.",
     )

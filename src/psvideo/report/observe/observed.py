@@ -18,6 +18,7 @@ from psvideo.model.arrays import Flags, Integers
 from psvideo.model.channels import brightest_channel
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Surface
+from psvideo.model.turn import UPRIGHT, Turn
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
@@ -67,6 +68,7 @@ class Observed:
     ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
     plate.
     ``noises`` are how far the subject's light stands out of the plates' noise.
+    ``turn`` is how frames, which lie as the sensor read them, were turned to stand upright, as plates do.
     ``stills`` says that the pictures of a round are photographs, each under its own light; ``astray`` is by how far
     they lie apart.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
@@ -82,6 +84,7 @@ class Observed:
     first: int | None = None
     white: float | None = None
     stills: bool = False
+    turn: Turn = UPRIGHT
     facts: KeptFacts = field(default_factory=KeptFacts)
     counts: dict[str, Integers] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)

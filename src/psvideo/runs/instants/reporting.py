@@ -63,6 +63,7 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
         points=points,
         lens=Lens.of(rig, **size),
         stills=clip.plan.mode == "synced",
+        turn=clip.turn,
     )
 
 
