@@ -22,6 +22,7 @@ from psvideo.model.cost.in_step import dark_s_out_of_step, never_shown
 from psvideo.model.cost.motion_cost import motion_cost
 from psvideo.model.cost.shoot_figures import shoot_figures
 from psvideo.runs.capture_plan import capture_plan
+from psvideo.strobe.seizures import seizure_warning
 
 
 def table_text(shoot: Shoot) -> str:
@@ -47,6 +48,23 @@ def test_flicker_is_named_for_what_flickers() -> None:
     assert "flicker" not in kinds(nothing)
     often = planned(fps="1000", readout="0.9ms", flash="50us", dark_every=6)
     assert "Dark slots come" in text_of(often, "flicker")
+
+
+@pytest.mark.parametrize("fps", ["1000", "2000"])
+def test_a_code_of_dark_slots_at_over_70_a_second_flickers_at_what_it_repeats_by(fps: str) -> None:
+    """Its dark slots come unevenly: the light of a cycle, as a Fourier sum, swings by some per cent from 3 to 70 Hz."""
+    period_ms = 1e3 / float(fps)
+    shoot = planned(fps=fps, readout=f"{0.9 * period_ms}ms", flash=f"{0.1 * period_ms}ms", marker="coded")
+    plan, cycle_s = shoot.plan, shoot.plan.cycle_s
+    train = plan.train(0, len(plan.cycle_slots))
+    lit = np.array([not plan.flashes[slot].is_dark for slot in train.slot])
+    multiples = np.arange(1, int(70 * cycle_s) + 1)
+    turns = np.exp(-2j * np.pi * np.outer(multiples / cycle_s, train.start_s))
+    swing = 2 * np.abs((turns * lit).sum(axis=1)) / lit.sum()
+    assert swing[multiples / cycle_s >= 3].max() > 0.04
+    assert shoot.figures.dark_slot_rate_hz > 70
+    assert f"repeats {1 / cycle_s:.3g} times a second" in text_of(shoot, "flicker")
+    assert "the pattern of dark slots" in (seizure_warning(plan) or "")
 
 
 def test_a_margin_thinner_than_the_clocks_is_warned_of_with_what_would_do() -> None:

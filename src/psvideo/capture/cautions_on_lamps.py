@@ -107,6 +107,13 @@ def about_seizures(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
             f"{low:g} and "
             f"{high:g} Hz. {care} {rarer}",
         )
+    elif figures.pattern_hz is not None and figures.pattern_hz <= high:
+        yield warning(
+            "flicker",
+            f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, but unevenly: their pattern repeats "
+            f"{1 / figures.cycle_s:.3g} times a second, and the whole scene flickers at multiples of that, of which "
+            f"{figures.pattern_hz:.1f} Hz and more lie between {low:g} and {high:g} Hz. {care}",
+        )
 
 
 def about_the_leds(plan: Plan, figures: ShootFigures, limits: Limits) -> Iterator[Caution]:

@@ -23,13 +23,15 @@ class Rate:
 
 
 def flash_rates(plan: Plan) -> tuple[Rate, ...]:
-    """Return the rates of a plan that is played: all flashes, the round, dark slots, and each light by itself."""
+    """Return the rates of a plan that is played: all flashes, the round, dark slots, their pattern, and each light."""
     figures = shoot_figures(plan)
     dark = (Rate(what="dark slots", hz=figures.dark_slot_rate_hz),) if figures.dark_slot_rate_hz else ()
+    pattern = () if figures.pattern_hz is None else (Rate(what="the pattern of dark slots", hz=figures.pattern_hz),)
     return (
         Rate(what="all flashes together", hz=figures.flash_rate_hz),
         Rate(what="the round of lights", hz=figures.result_rate_hz),
         *dark,
+        *pattern,
         *(Rate(what=f"light {light.name}", hz=light.rate_hz) for light in figures.lights),
     )
 

@@ -78,6 +78,16 @@ class ShootFigures:
     slots: tuple[SlotFigures, ...]
     lights: tuple[LightFigures, ...]
 
+    @property
+    def pattern_hz(self) -> float | None:
+        """The lowest rate, of 3 Hz or more, at which a pattern of dark slots that is longer than a round flickers: they
+        come unevenly, so the light swings at multiples of the cycle's rate, however many there are a second. None where
+        they come in each round, once a cycle, or less than three times a second."""
+        even = self.cycle_s < 1.5 * self.round_s or self.dark_slot_rate_hz * self.cycle_s < 1.5
+        if even or self.dark_slot_rate_hz < SEIZURE_HZ[0]:
+            return None
+        return max(math.ceil(SEIZURE_HZ[0] * self.cycle_s), 1) / self.cycle_s
+
 
 def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigures:
     """Return the figures of a plan; ``speed_px_s`` is how fast the subject moves in the picture."""
