@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.frame_rates import parse_fps
 from psvideo.formats.plan_toml import format_plan, parse_plan, read_plan
 from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig
 from psvideo.formats.timing_json import format_timing, read_timing
@@ -284,3 +285,9 @@ def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
 
 def test_exact_frame_rates_survive(make_plan: Callable[..., Plan]) -> None:
     assert parse_plan(format_plan(make_plan(fps=Fraction(24000, 1001)))).camera.fps == Fraction(24000, 1001)
+
+
+@pytest.mark.parametrize("fps", [0, -24, 1_000_001, "1e9"])
+def test_a_frame_rate_is_refused_with_both_its_bounds(fps: float | str) -> None:
+    with pytest.raises(ValueError, match="above 0, and at most 1,000,000"):
+        parse_fps(fps)

@@ -4,6 +4,8 @@ from fractions import Fraction
 
 from psvideo.model.units import NTSC
 
+MOST_FPS = 1_000_000
+"""No camera of rows is faster: what is more is a slip, or a time."""
 ROUNDED = Fraction(200, 1_000_000)
 """A rate that is written with a point may be rounded by this share of it."""
 
@@ -20,8 +22,8 @@ def parse_fps(fps: float | str) -> Fraction:
         rate = Fraction(str(fps))
     except (ValueError, ZeroDivisionError):
         raise ValueError('expected a number or a ratio as text, such as 100 or "120000/1001"') from None
-    if not 0 < rate <= 1_000_000:
-        raise ValueError("expected a rate above 0")
+    if not 0 < rate <= MOST_FPS:
+        raise ValueError(f"expected a rate above 0, and at most {MOST_FPS:,} frames a second")
     return rate
 
 
