@@ -271,3 +271,25 @@ def test_a_direction_that_people_rounded_is_made_a_unit_vector() -> None:
     assert rounded is not None
     assert sum(part**2 for part in rounded) == pytest.approx(1, abs=1e-12)
     assert Light(name="key", direction=(0.0, 0.6, 0.8)).direction == (0.0, 0.6, 0.8), "to the bit"
+
+
+@pytest.mark.parametrize("name", ["#1", "%a", "1e5", "0 1 0"])
+def test_a_name_that_an_lp_list_would_read_as_something_else_is_refused(name: str, tmp_path: Path) -> None:
+    names = (name, "1 0 0" if name == "0 1 0" else "b", "c")
+    directions = ((0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (-0.6, 0.0, 0.8))
+    rig = Rig(tuple(Light(name=one, direction=at) for one, at in zip(names, directions, strict=True)))
+    with pytest.raises(PsvideoError, match=r"a\.lp: the lights' names .* would be read as comments or numbers"):
+        write_rig(tmp_path / "a.lp", rig)
+    assert not (tmp_path / "a.lp").exists()
+    write_rig(tmp_path / "a.toml", rig)
+    assert read_rig(tmp_path / "a.toml").names == names
+
+
+@pytest.mark.parametrize(
+    "names", [("1", "2", "3"), ("3", "2", "1"), ("key 1", "key 2", "key 3"), ("k#1", "k #2", "10")]
+)
+def test_other_names_are_written_as_they_are(names: tuple[str, ...], tmp_path: Path) -> None:
+    directions = ((0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (-0.6, 0.0, 0.8))
+    rig = Rig(tuple(Light(name=one, direction=at) for one, at in zip(names, directions, strict=True)))
+    write_rig(tmp_path / "a.lp", rig)
+    assert read_rig(tmp_path / "a.lp").lights == rig.lights

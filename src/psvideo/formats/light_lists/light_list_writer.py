@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.light_lists.light_list_lines import directed, lines_in
 from psvideo.formats.light_lists.light_list_reader import DIRECTIONS, INTENSITIES
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
@@ -35,7 +36,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
 def write_rig(path: Path, rig: Rig) -> tuple[str, ...]:
     """Write a rig in the kind that the file's name shows; return in whole sentences what that kind cannot hold.
 
-    Raises PsvideoError where a light is near: lists hold directions.
+    Raises PsvideoError where a light is near, as lists hold directions, or where its name cannot be read back.
     """
     kind = kind_of(path)
     if kind == "toml":
@@ -44,7 +45,9 @@ def write_rig(path: Path, rig: Rig) -> tuple[str, ...]:
     directions = [_direction(path, light) for light in rig.lights]
     if kind == "lp":
         lines = [f"{light.name} {_numbers(at)}" for light, at in zip(rig.lights, directions, strict=True)]
-        write_text(path, "\n".join([str(len(lines)), *lines, ""]))
+        text = "\n".join([str(len(lines)), *lines, ""])
+        _refuse_misread(path, text, rig)
+        write_text(path, text)
     else:
         write_text(path.with_name(INTENSITIES), "".join(f"{_numbers(_three(light))}\n" for light in rig.lights))
         write_text(path, "".join(f"{_numbers(at)}\n" for at in directions))
@@ -58,6 +61,21 @@ def _direction(path: Path, light: Light) -> Vector:
             "Write a .toml, or give the light the direction from the middle of the surface."
         )
     return light.direction
+
+
+def _refuse_misread(path: Path, text: str, rig: Rig) -> None:
+    """Raise PsvideoError where a list does not read as what it was written from: a name is a comment, or numbers."""
+    lines = lines_in(text)[1:]
+    try:
+        found = [line.numbers for line in directed(path, lines, by_count=True)] if len(lines) == len(rig.lights) else []
+    except PsvideoError:
+        found = []
+    if found != [light.direction for light in rig.lights]:
+        odd = [name for name in rig.names if not name[0].isalpha()] or list(rig.names)
+        raise PsvideoError(
+            f"{path}: the lights' names {', '.join(map(repr, odd))} would be read as comments or numbers in such a "
+            "list. Expected names that begin with a letter: name the lights so, or write a .toml."
+        )
 
 
 def _three(light: Light) -> tuple[float, ...]:
