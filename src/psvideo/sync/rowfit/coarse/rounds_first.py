@@ -13,8 +13,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.beat import Beat, FoundClock, train_between
-from psvideo.sync.rowfit.coarse.search import GridPlace, clock_ratios_ppm, losses, search
+from psvideo.sync.rowfit.beat import Beat, train_between
+from psvideo.sync.rowfit.coarse.search import GridPlace, clock_ratios_ppm, losses, search, turned_clocks
 from psvideo.sync.rowfit.profiles import Profiles
 
 SHORT_ROUNDS = 3
@@ -50,17 +50,13 @@ def _in_code(
     begins_s = float(round_starts_s[np.argmin(np.abs(round_starts_s - _middle_s(plan, rows)))])
     cycle = plan.train(0, len(plan.cycle_slots))
     places_s = cycle.start_s[cycle.slot == plan.lit_slots[0]]
-    clocks = [
-        FoundClock(phase_s=begins_s - float(place_s), offset_ppm=0.0).shifted(0.0, float(ppm), pivot_s=begins_s)
-        for ppm in clock_ratios_ppm(plan, rows, range_ppm)
-        for place_s in places_s
-    ]
+    clocks = turned_clocks(begins_s - places_s, clock_ratios_ppm(plan, rows, range_ppm), begins_s)
     height = rows.place.max() + rows.place.min() + 1
     loss = losses(plan, rows, clocks, beat, place=height - 1 - rows.place if turned else rows.place)
     each = (loss.mean(axis=1) / len(rows.value)).reshape(-1, len(places_s))
     best = each.argmin(axis=0)
     for k in np.argsort(each.min(axis=0), kind="stable")[:2]:
-        clock = clocks[int(best[k]) * len(places_s) + int(k)]
+        clock = clocks.at(int(best[k]) * len(places_s) + int(k))
         yield GridPlace(beat=replace(beat, clock=clock), loss=float(each[best[k], k]))
 
 

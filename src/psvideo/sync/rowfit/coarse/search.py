@@ -6,6 +6,7 @@ search.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,27 @@ LOW = 0.15
 """the others only for this share of the clocks, the lowest."""
 
 
+class TriedClocks(NamedTuple):
+    """TriedClocks to try: what ``FoundClock`` holds of each, (clock,). A grid has a hundred thousand."""
+
+    phase_s: Doubles
+    offset_ppm: Doubles
+
+    def at(self, n: int) -> FoundClock:
+        """Return one of them."""
+        return FoundClock(phase_s=float(self.phase_s[n]), offset_ppm=float(self.offset_ppm[n]))
+
+    def only(self, among: NDArray[np.int64]) -> "TriedClocks":
+        """Return some of them."""
+        return TriedClocks(self.phase_s[among], self.offset_ppm[among])
+
+
+def turned_clocks(phases_s: Doubles, ppm: Doubles, pivot_s: float) -> TriedClocks:
+    """Return a clock of each phase turned about a time by each of some ppm, the phases of the first ppm first."""
+    phase_s = phases_s[None, :] + (phases_s[None, :] - pivot_s) * ppm[:, None] * 1e-6
+    return TriedClocks(phase_s.ravel(), np.repeat(ppm, len(phases_s)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class GridPlace:
     """A place on the grid and its mean loss per sample."""
@@ -42,22 +64,17 @@ def search(
     ``start`` gives exposure, tails and, where it is known, row time and direction.
     """
     phases_s, ppm = _grid(plan, rows, range_ppm)
-    pivot_s = float(rows.frame_start_s.mean())
-    clocks = [
-        FoundClock(phase_s=float(phase_s), offset_ppm=0.0).shifted(0.0, float(offset), pivot_s=pivot_s)
-        for offset in ppm
-        for phase_s in phases_s
-    ]
+    clocks = turned_clocks(phases_s, ppm, float(rows.frame_start_s.mean()))
     if readout_known:
         loss = _least(plan, rows, clocks, start).reshape(len(ppm), len(phases_s)) / len(rows.value)
         best = _best(loss[None], keep)
-        return [GridPlace(beat=_placed(start, clocks[a * len(phases_s) + b]), loss=value) for _, a, b, value in best]
+        return [GridPlace(beat=_placed(start, clocks.at(a * len(phases_s) + b)), loss=value) for _, a, b, value in best]
     loss = losses(plan, rows, clocks, start, place=np.zeros_like(rows.place))
     loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
     return _over_readouts(rows, loss, clocks, phases_s, start, keep)
 
 
-def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) -> Doubles:
+def _least(plan: Plan, rows: Profiles, clocks: TriedClocks, start: Beat) -> Doubles:
     """Return every clock's mean loss over the rows (clock,); infinite where a few of the rows show it to be high."""
     height = len(rows.place)
     few = np.zeros(height, np.bool_)
@@ -65,13 +82,13 @@ def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) ->
     total = _sum_over(plan, rows, few, clocks, start)
     if few.all():
         return total / height
-    low = np.argsort(total, kind="stable")[: max(int(LOW * len(clocks)), 1)]
-    loss = np.full(len(clocks), np.inf)
-    loss[low] = (total[low] + _sum_over(plan, rows, ~few, [clocks[n] for n in low.tolist()], start)) / height
+    low = np.argsort(total, kind="stable")[: max(int(LOW * len(total)), 1)]
+    loss = np.full(len(total), np.inf)
+    loss[low] = (total[low] + _sum_over(plan, rows, ~few, clocks.only(low), start)) / height
     return loss
 
 
-def _sum_over(plan: Plan, rows: Profiles, among: NDArray[np.bool_], clocks: list[FoundClock], start: Beat) -> Doubles:
+def _sum_over(plan: Plan, rows: Profiles, among: NDArray[np.bool_], clocks: TriedClocks, start: Beat) -> Doubles:
     """Return every clock's loss (clock,), summed over some of the rows."""
     part = rows.only_rows(among)
     total: Doubles = losses(plan, part, clocks, start, place=part.place).sum(axis=1)
@@ -93,11 +110,10 @@ def clock_ratios_ppm(plan: Plan, rows: Profiles, range_ppm: float) -> Doubles:
     return ppm
 
 
-def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: Doubles) -> Doubles:
+def losses(plan: Plan, rows: Profiles, clocks: TriedClocks, start: Beat, *, place: Doubles) -> Doubles:
     """Return the loss of every clock in every row, shape (clock, row)."""
     first_s, last_s = float(rows.frame_start_s[0]), float(rows.frame_start_s[-1])
-    latest_s = max(clock.phase_s for clock in clocks)
-    earliest_s = min(clock.phase_s for clock in clocks)
+    latest_s, earliest_s = float(clocks.phase_s.max()), float(clocks.phase_s.min())
     cycle = len(plan.cycle_slots)
     begin = int(np.floor((first_s - latest_s) / plan.cycle_s)) - 1
     end = int(np.ceil((last_s + 3 * rows.period_s - earliest_s) / plan.cycle_s)) + 1
@@ -107,12 +123,12 @@ def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *,
         train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, start.rise_s, start.fall_s, 0.0
     )
     seen = compiled_rows(rows, start)._replace(row_place=place)
-    phase_s, rate = np.array([c.phase_s for c in clocks]), np.array([c.rate for c in clocks])
-    found = np.empty((len(clocks), rows.value.shape[1]))
+    phase_s, rate = clocks.phase_s, 1.0 + clocks.offset_ppm * 1e-6
+    found = np.empty((len(phase_s), rows.value.shape[1]))
     spread = rows.spread
     over_ranges(
         lambda a, b: kernel.losses_by_row(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
-        len(clocks),
+        len(phase_s),
         each=rows_of_a_part(rows.value.size),
     )
     return found
@@ -121,7 +137,7 @@ def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *,
 def _over_readouts(
     rows: Profiles,
     loss: Doubles,
-    clocks: list[FoundClock],
+    clocks: TriedClocks,
     phases_s: Doubles,
     start: Beat,
     keep: int,
@@ -145,7 +161,7 @@ def _over_readouts(
     found = []
     for r, a, b, value in _best(total / loss.shape[2], keep):
         beat = Beat(
-            clock=clocks[a * len(phases_s) + b],
+            clock=clocks.at(a * len(phases_s) + b),
             row_time_s=abs(float(readouts_s[r])) / height,
             exposure_s=start.exposure_s,
             upward=bool(readouts_s[r] < 0),
