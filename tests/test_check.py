@@ -24,6 +24,7 @@ from psvideo.errors import NoStrobeError
 from psvideo.model.timing import Timing
 from psvideo.report.observe.focus import sharpest_blur_px
 from psvideo.runs.many_takes.arriving import takes_in, whole_takes
+from psvideo.runs.many_takes.check_folder import Unread, check_takes
 from psvideo.runs.steps.checked import Check
 from psvideo.sync.take_timing import find_timing
 
@@ -319,6 +320,13 @@ def test_several_takes_are_checked_and_one_that_cannot_be_read_does_not_keep_the
     assert "nothing: cannot be checked yet" in said
     assert "2 takes checked: 1 usable, 0 not, 1 could not be read." in said
     assert "nothing" in page.read_text(encoding="utf-8")
+
+
+def test_a_take_that_never_was_is_not_said_to_be_removed(tmp_path: Path) -> None:
+    (found,) = check_takes([tmp_path / "nope"])
+    assert isinstance(found, Unread)
+    assert "removed" not in found.fault
+    assert "nope" in found.fault
 
 
 def test_a_check_of_several_takes_that_is_stopped_is_no_pass(

@@ -281,7 +281,14 @@ def test_ranges_choose_among_the_frames_that_are_there(text: str, numbers: tuple
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("", "not a frame range"), ("a-b", "not a frame range"), ("90-99", "names none")]
+    ("text", "message"),
+    [
+        ("", "not a frame range"),
+        ("a-b", "not a frame range"),
+        ("90-99", "names none"),
+        ("9-8", "runs backwards"),
+        ("8,9-8", "9-8 runs"),
+    ],
 )
 def test_ranges_that_say_nothing_are_wrong_usage(text: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):

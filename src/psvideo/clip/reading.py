@@ -77,6 +77,10 @@ def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
         raise UsageError(f"`frames` {text}: names more frames than any clip has; {_span(present)}.") from None
     except (ParseException, ValueError):
         raise UsageError(f"`frames` {text}: is not a frame range. Write for example 1-100 or 1-100x2.") from None
+    for part in text.split(","):
+        ends = tuple(FrameSet(part)) if part.strip() else ()
+        if len(ends) > 1 and ends[0] > ends[-1]:
+            raise UsageError(f"`frames` {text}: {part.strip()} runs backwards. Write the first frame first.")
     chosen = tuple(number for number in present if number in wanted)
     if not chosen:
         raise UsageError(f"`frames` {text}: names none of the clip's frames; {_span(present)}.")

@@ -74,7 +74,7 @@ def live(
     yes: Yes = False,
     pace: Annotated[
         Pace,
-        typer.Option("--pace", help="A clip's own pace, or fastest: every round is solved, nothing is left out."),
+        typer.Option("--pace", help="A clip's own pace, or fastest: once the strobe is found, every round is solved."),
     ] = "own",
     seconds: Annotated[
         float | None, typer.Option("--seconds", min=0.0, help="End after this many seconds of footage.")

@@ -130,11 +130,12 @@ def _checks(
 
 
 def _one(path: Path, plan: Path | None, rig: Path | None, first_light: str | None, caller: Caller) -> Check | Unread:
+    was_there = path.exists()
     try:
         return judged_take(path, plan=plan, rig=rig, first_light=first_light, caller=caller)
     except (PsvideoError, OSError) as fault:
         gone = f"{path}: was removed before it could be checked."
-        return Unread(path=path, fault=caller.spell(str(fault)) if path.exists() else gone)
+        return Unread(path=path, fault=caller.spell(str(fault)) if path.exists() or not was_there else gone)
 
 
 def _keep(page: Path | None, found: Mapping[Path, Check | Unread], *, worst_first: bool = False) -> None:
