@@ -5,6 +5,7 @@ import itertools
 import re
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,14 @@ from psvideo.capture.planning import Shoot, plan_shoot
 from psvideo.capture.tables import shoot_report
 from psvideo.cli.options.capture import ShootWords
 from psvideo.cli.options.shoot_words import parse_request
-from psvideo.errors import UsageError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.cost.in_step import dark_s_out_of_step, never_shown
 from psvideo.model.cost.motion_cost import motion_cost
 from psvideo.model.cost.shoot_figures import shoot_figures
+from psvideo.model.plan import Plan
 from psvideo.runs.capture_plan import capture_plan
+from psvideo.strobe.link.boards import BOARDS, Board, capabilities
+from psvideo.strobe.program import make_program
 from psvideo.strobe.seizures import seizure_warning
 
 
@@ -65,6 +69,36 @@ def test_a_code_of_dark_slots_at_over_70_a_second_flickers_at_what_it_repeats_by
     assert shoot.figures.dark_slot_rate_hz > 70
     assert f"repeats {1 / cycle_s:.3g} times a second" in text_of(shoot, "flicker")
     assert "the pattern of dark slots" in (seizure_warning(plan) or "")
+
+
+NINE = ",".join("abcdefghi")
+
+
+@pytest.mark.parametrize(
+    ("given_words", "said"),
+    [
+        ({"lights": NINE, "fps": "240", "readout": "4ms"}, "9 lights take as many lines, and boards have 8"),
+        ({"lights": "a,b,c", "fps": "12000", "readout": "80us", "flash": "20us"}, "the dark time is 83.34 us"),
+        ({"fps": "4", "readout": "9ms", "flash": "60ms"}, "a flash lasts 60 ms, and theirs 50 ms at most"),
+        ({"lights": "a,b,c,d,e,f,g,h"}, ""),
+        ({"fps": "4", "flash": "50ms"}, ""),
+        ({"fps": "9998", "readout": "80us", "flash": "20us"}, ""),
+        ({"lights": NINE, "mode": "synced", "readout": "0"}, ""),
+    ],
+)
+def test_what_no_board_plays_is_warned_of_and_what_one_plays_is_not(given_words: dict[str, object], said: str) -> None:
+    shoot = planned(**given_words)
+    assert said in text_of(shoot, "board")
+    assert ("board" in kinds(shoot)) == bool(said)
+    if shoot.plan.mode != "synced":
+        assert any(map(partial(plays, shoot.plan), BOARDS.values())) == (not said)
+
+
+def plays(plan: Plan, board: Board) -> bool:
+    try:
+        return bool(make_program(plan, capabilities(board, board.first_wiring)))
+    except PsvideoError:
+        return False
 
 
 def test_a_margin_thinner_than_the_clocks_is_warned_of_with_what_would_do() -> None:

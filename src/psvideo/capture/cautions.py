@@ -28,6 +28,13 @@ from psvideo.model.marker import has_marker
 from psvideo.model.plan import Plan
 from psvideo.model.units import NTSC, show_rate, show_seconds
 
+BOARD_LINES = 8
+"""Lights of their own, or that never flash alone, that a known board has lines for (lights/protocol.toml)."""
+BOARD_DARK_S, BOARD_FLASH_S = 100e-6, 0.05
+"""The shortest dark time and the longest flash that every known board plays (lights/protocol.toml)."""
+HALF_TICK_S = 0.25e-6
+"""Boards round times to their ticks, of half a microsecond at most."""
+
 
 def request_cautions(request: ShootRequest) -> tuple[Caution, ...]:
     """Return what is to be said about the camera's figures."""
@@ -42,6 +49,7 @@ def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None =
         *about_the_light_of_a_flash(plan, figures, limits),
         *about_blur(figures, limits),
         *_about_the_marker(plan),
+        *_about_the_board(plan),
         *about_seizures(plan, figures),
         *about_the_margin(plan, figures),
         *about_blind_time(plan, figures),
@@ -100,3 +108,27 @@ def _about_the_marker(plan: Plan) -> Iterator[Caution]:
             "Without a dark slot ambient light is taken off only where the subject stands still, and none in synced "
             "clips: keep the room dark.",
         )
+
+
+def _about_the_board(plan: Plan) -> Iterator[Caution]:
+    """Warn of what no known board plays; what is triggered by the camera has a controller of its own."""
+    if plan.mode == "synced":
+        return
+    lines = len({plan.powers(name) for name in plan.lights})
+    longest_s = max(flash.duration_s for flash in plan.flashes)
+    faults = []
+    if lines > BOARD_LINES:
+        faults.append(f"{lines} lights take as many lines, and boards have {BOARD_LINES}: take fewer lights")
+    if plan.dark_s < BOARD_DARK_S - HALF_TICK_S:
+        faults.append(
+            f"the dark time is {show_seconds(plan.dark_s)}, and theirs {show_seconds(BOARD_DARK_S)} at least: give a "
+            "longer `dark_s`, or film slower"
+        )
+    if longest_s > BOARD_FLASH_S + HALF_TICK_S:
+        faults.append(
+            f"a flash lasts {show_seconds(longest_s)}, and theirs {show_seconds(BOARD_FLASH_S)} at most: give a "
+            "shorter `flash_s`"
+        )
+    if faults:
+        text = f"No board that psvideo knows plays this plan: {'; '.join(faults)}; or drive the lights by other means."
+        yield warning("board", text)
