@@ -17,6 +17,7 @@ from psvideo.report.judge.rig_by_plates import (
 from psvideo.report.judge.rig_of_three import three_lights
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
 
 def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> Iterator[Judgement]:
@@ -56,8 +57,10 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
         yield _beside_weaker(weaker)
     elif fit is not None:
         yield rig_explains(fit, lights=int(observed.firing.sum()))
-    elif observed.slopes:
+    elif observed.slopes and int(observed.firing.sum()) == ALL_EXPLAINED:
         yield three_lights(observed)
+    elif observed.slopes:  # of more lights too few points are lit by all, so that nothing else is known
+        yield Judgement(subject="rig", grade="good", found="The normals fit together as one surface's.")
 
 
 def _beside_weaker(weaker: Sequence[str]) -> Judgement:
