@@ -522,13 +522,6 @@ def test_of_four_lights_that_the_rig_nearly_explains_a_twentieth_must_be_trusted
     assert graded(validity(one), "validity") == grade
 
 
-def test_hardly_a_trusted_normal_is_no_take_to_be_used_where_surface_or_rig_are_to_blame() -> None:
-    one = Footage().observed(0)
-    misfit = Misfit(share=0.1, error_deg=10 / result.MEAN_OF_HELD)
-    one.facts = KeptFacts(replace(facts, misfit=misfit, valid_share=0.03, measured_share=1.0) for facts in one.facts)
-    assert graded(validity(one), "validity") == "bad"
-
-
 @pytest.mark.parametrize(("claimed_deg", "grade"), [(0, "good"), (3, "good"), (8, "unknown")])
 @pytest.mark.parametrize("shape", ["ball", "waves"])
 def test_four_lights_that_leave_what_wrong_directions_would_do_not_show_the_rig_to_be_right(

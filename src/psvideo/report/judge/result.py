@@ -35,7 +35,8 @@ MOVING_FACTOR = 2.0
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
 NONE_VALID = 0.05
-"""With less, what is good for a look is all that is left, whatever is to blame: no take to be used."""
+"""With less, what is good for a look is all that is left: no take to be used where no line says how far normals are
+off. (A cat under twelve directions that are a few degrees off: as little, and accuracy says by how much.)"""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -97,7 +98,10 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
         if beyond_deg is None
         else max(COMMON_DEG, by_noise_deg(observed.facts)) < beyond_deg <= LOST_DEG
     )
-    lost = max(shares) < NONE_VALID or (max(shares) < HARDLY_VALID and not by_surface)
+    said = by_surface and (
+        beyond_deg is not None or max(shares) >= NONE_VALID
+    )  # accuracy has its line, and its measure
+    lost = max(shares) < HARDLY_VALID and not said
     grade: Grade = "bad" if lost else "doubtful"
     if enough:
         yield Judgement(
