@@ -21,7 +21,7 @@ from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
-from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, torn_share, turned_unseen
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, FEW_LIGHTS, torn_share, turned_unseen
 
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
@@ -37,8 +37,6 @@ TELLING, TELLING_OF_FOUR, HIDDEN_POWER, MOST_HIDDEN = 2.3, 6.0, 0.8, 4.0
 times, five and six of them or four, with this power of it, and up to so much more. Over 490 sets of 4 to 8
 lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go with that measure to the powers 0.4
 to 0.6 (half of this one is used, ``few_power``), and not with the lights' condition number."""
-FEW_LIGHTS = 6
-"""More lights are told apart by their number alone: with eight that held as well."""
 LEAST_UNREACHED = 0.02
 """Light from around is known where at least this many lights, in the mean, do not reach a point."""
 

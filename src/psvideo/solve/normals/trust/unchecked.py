@@ -17,6 +17,8 @@ from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
 ALL_EXPLAINED = 3
 """This many lights leave no residual."""
+FEW_LIGHTS = 6
+"""How more lights than these stand is not looked at: with eight their number alone held as well."""
 OF_MATERIALS_DEG = np.float32(2.5)
 """Two thirds of the normals are off by no more, for lights that spread noise into them once, beside what shows in
 normals that belong to no surface. Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig
@@ -59,7 +61,7 @@ def torn_share(points: ThinSurface, lit: Illumination) -> Floats | float:
     else shows: wholly where a light may not reach, less where all do, and not at all under lights that check each
     other."""
     unseen = min(max((turned_unseen(lit) - SEEN) / (UNSEEN - SEEN), 0.0), 1.0)
-    if not unseen:
+    if not unseen or len(lit.directions) > FEW_LIGHTS:
         return 0.0
     if lit.near is None:
         towards = lit.directions.astype(np.float32)[..., None, None]
