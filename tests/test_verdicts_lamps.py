@@ -1,0 +1,221 @@
+"""What is said of each light: dead, weak, flickering or as strong as the rig says, and what to set its power to."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from judged_footage import (
+    ONE_WEAKER,
+    SEEDS,
+    Footage,
+    even,
+    exposure,
+    facts_of,
+    graded,
+    lamps,
+    looked_at,
+    plan_of,
+    rig_but_leaning,
+    rig_of,
+    validity,
+)
+
+from psvideo.report.judge import result
+from psvideo.report.judge.of_exposure import exposure as judge_exposure
+from psvideo.report.judge.powers import power_words
+from psvideo.report.judge.rig_by_plates import lights_near
+from psvideo.report.judgement import verdict_of
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.kept_facts import KeptFacts
+from psvideo.report.observe.levels import count_levels
+from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
+
+
+def levels(share: float) -> list[float]:
+    return [1.0, 1.0 + share]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("shape", "sheen"), [("ball", (0.4, 30)), ("waves", (0.8, 6))])
+def test_among_many_lights_those_that_are_not_as_strong_as_the_rig_says_are_named(
+    shape: str, sheen: tuple[float, float], seed: int
+) -> None:
+    """Photographs of a bear, of which a few were a quarter brighter, were said to show a surface that is not matte."""
+    off, right = (
+        Footage(shape=shape, lights=8, gains=gains, sheen=sheen, solved=True).observed(seed)
+        for gains in ([1.0, 1.2, 1.0, 1.0, 1.0, 0.82, 1.0, 1.0], [1.04, 0.96] * 4)
+    )
+    (line,) = (one for one in rig_but_leaning(off) if one.grade != "good")
+    assert (line.subject, line.grade) == ("rig", "doubtful")
+    assert re.search(r"it would: 'light5' 8[1-4] %, 'light1' 1(1[7-9]|2[01]) % of what the rig says", line.found)
+    assert not any("other strengths" in one.found for one in rig_of(right))
+    assert "not as strong" in " ".join(one.found for one in result.accuracy(off))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_strengths_are_told_beside_a_light_that_is_dead(seed: int) -> None:
+    gains = [1.0, 1.3, 1.0, 0.0, 1.0, 0.75, 1.0, 1.0, 1.0]
+    dead = Footage(shape="waves", lights=9, gains=gains, sheen=(0.2, 12), solved=True).observed(seed)
+    assert any("'light5' 7" in one.found and "'light3'" not in one.found for one in rig_but_leaning(dead))
+    assert "not as strong" in " ".join(one.found for one in result.accuracy(dead))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("share", [0.07, 0.3])
+def test_strengths_are_told_beside_a_light_that_the_rig_calls_weak(share: float, seed: int) -> None:
+    """Under a tenth of the others' it was in shadow everywhere, and of no light was said how strong it is."""
+    gains = [share, 1.2, 1.0, 0.8, 1.0, 1.0, 1.0, 1.0]
+    off, right = (
+        Footage(shape="waves", lights=8, gains=own, claimed_gain=share, sheen=(0.2, 12), solved=True).observed(seed)
+        for own in (gains, [share] + [1.0] * 7)
+    )
+    assert any("'light3' 8" in one.found and "'light0'" not in one.found for one in rig_but_leaning(off))
+    assert "not as strong" in " ".join(one.found for one in result.accuracy(off))
+    assert right.rig_fit is not None
+    assert not any("not as strong" in one.found or "other strengths" in one.found for one in rig_of(right))
+
+
+@pytest.mark.parametrize(("by_surface", "named"), [(0.9, True), (0.5, False)])
+def test_lamps_are_said_to_stand_near_where_that_explains_more_than_the_surface_would(
+    by_surface: float, named: bool
+) -> None:
+    fit = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(0).rig_fit
+    assert fit is not None
+    assert fit.near is not None
+    near = replace(fit.near, rise=0.5, misfit=0.6 * fit.misfit, by_surface=by_surface * fit.misfit)
+    found = lights_near(replace(fit, near=near))
+    assert (found is not None) == named
+
+
+def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_still_checked() -> None:
+    dead = Footage(lights=6, gains=[1, 1, 0, 1, 1, 1], solved=True).observed(0)
+    (line,) = lamps(dead)
+    assert (line.grade, line.found) == (
+        "doubtful", "The light 'light2' gives no light (0.0 % of the strongest); normals come from the other 5."
+    )  # fmt: skip
+    assert verdict_of([line, *rig_of(dead), *validity(dead)]) == "This take is usable, with reservations."
+    wrong = Footage(shape="waves", lights=6, gains=[1, 1, 0, 1, 1, 1], claimed_deg=40, solved=True).observed(0)
+    assert graded(rig_but_leaning(wrong), "rig") in ("doubtful", "bad")
+
+
+def test_many_dead_lights_are_one_line() -> None:
+    (line,) = lamps(Footage(lights=10, gains=[1, 1, 0, 1, 0, 0, 0, 0, 1, 1], solved=True).observed(0))
+    assert line.found == (
+        "5 lights give no light ('light2', 'light4', 'light5', 'light6' and 1 more; at most 0.0 % of the strongest); "
+        "normals come from the other 5."
+    )
+
+
+@pytest.mark.parametrize(("dimmed", "failed"), [(1.0, False), (0.2, True)])
+def test_a_light_does_not_fail_where_only_the_value_changes_at_which_it_clips(dimmed: float, failed: bool) -> None:
+    """Lamps of several colours that are separated clip at another value in every round."""
+    one = Observed(lights=("a", "b", "c"))
+    for number in range(8):
+        white = 5.0 if number == 2 else 1.0
+        levels = tuple(level * (dimmed if number == 2 else 1.0) / white for level in (0.3, 0.2, 0.25))
+        one.facts.append(
+            InstantFacts(number=number, time_s=0.0, valid_share=1.0, clipped_share=0.0, unseen_share=0.0,
+                         levels=levels, clipped=(0.0,) * 3, white=(white,) * 3, moving_share=0.0)
+        )  # fmt: skip
+    assert any("Nothing is lit in 1 of 8 rounds" in line.found for line in lamps(one)) == failed
+    assert not any("flickers" in line.found for line in lamps(one))
+
+
+def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> None:
+    one = Footage(rounds=2).observed(0)
+    one.counts[one.lights[0]] = np.zeros_like(one.counts[one.lights[0]])
+    one.facts = KeptFacts(replace(fact, levels=(0.0, *fact.levels[1:])) for fact in one.facts)
+    assert [line.grade for line in lamps(one)] == ["good"]
+
+
+def test_a_light_that_was_never_seen_does_not_pass_for_a_bright_one() -> None:
+    dim = np.full(1000, 0.005, np.float32)
+    one = Observed(lights=("a", "b"))
+    one.counts["a"], one.counts["b"] = count_levels(dim, 1.0), np.zeros_like(count_levels(dim, 1.0))
+    (line,) = judge_exposure(one)
+    assert (line.grade, "The picture is dark" in line.found) == ("bad", True)
+    assert list(power_words(plan_of(("a", "b")), one)) == ["a"]
+
+
+def test_lights_that_were_never_seen_are_not_said_to_fire() -> None:
+    one = Observed(lights=("a", "b", "c"))
+    bright = count_levels(np.full(100, 0.5, np.float32), 1.0)
+    one.counts |= {"a": bright, "b": bright, "c": np.zeros_like(bright)}
+    for number in range(4):
+        one.facts.append(facts_of(number=number, levels=(0.4, 0.4, 0.4), clipped=(0.0,) * 3, white=(1.0,) * 3,
+                                  unseen_share=0.1 if number else 0.0))  # fmt: skip
+    (line,) = lamps(one)
+    assert line.found == "The 2 of 3 lights that were seen fire; the weakest gives 0.0 stops less than the strongest."
+
+
+def test_lamps_are_not_said_to_fire_where_nothing_is_lit() -> None:
+    one = looked_at([even(name, 0.0) for name in "abc"])
+    assert [line.subject for line in (*exposure(one), *lamps(one))] == ["exposure"]
+
+
+@pytest.mark.parametrize(("moving", "named"), [(0.0, ["a", "b"]), (0.3, []), (None, [])])
+def test_lamps_flicker_only_where_it_is_known_that_nothing_moves(moving: float | None, named: list[str]) -> None:
+    levels = 0.3 * (1 + 0.1 * np.sin(1.9 * np.arange(10)))
+    facts = [
+        facts_of(levels=(level, level), clipped=(0.0,) * 2, white=(1.0,) * 2, moving_share=moving) for level in levels
+    ]
+    said = [
+        line.found for line in lamps(Observed(lights=("a", "b"), facts=KeptFacts(facts))) if "flickers" in line.found
+    ]
+    assert [line.split("'")[1] for line in said] == named
+
+
+def test_one_light_is_not_compared_with_itself() -> None:
+    assert [line.found for line in lamps(looked_at([even("a", 0.5)]))] == ["The light fires in every round."]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_light_that_the_plan_itself_sets_weak_is_not_held_against_the_rig(seed: int) -> None:
+    gains = [1.0, 0.1, 1.0, 1.0]
+    as_planned, weaker = (
+        lamps(Footage(lights=4, gains=gains, powers=powers, solved=True).observed(seed))
+        for powers in (ONE_WEAKER, (1.0,))
+    )
+    assert graded(as_planned, "lights") == "doubtful"  # its noise is larger, and no more
+    assert graded(weaker, "lights") == "bad"
+
+
+@pytest.mark.parametrize(("clipping", "words"), [(5, "all powers to"), (1, "its power"), (9, "their powers")])
+def test_powers_to_lower_are_said_as_a_share_of_what_they_are(clipping: int, words: str) -> None:
+    """Lamps at 40 % that clipped by far were told "lower all powers to 50 %", which is more."""
+    lines = exposure(
+        Footage(lights=5 if clipping <= 5 else clipping + 1, clip=0.16, clipping=clipping, noise=0).observed(0)
+    )
+    (line,) = (one for one in lines if one.subject == "clipping")
+    assert words in line.advice
+    assert re.search(r"\d %( of the| of) what (it is|they are)", line.advice)
+
+
+@pytest.mark.parametrize(("planned", "said"), [(0.04, "to 0.4 % (now 4 %)"), (0.5, "to 5 % (now 50 %)")])
+def test_no_power_is_advised_as_nothing(planned: float, said: str) -> None:
+    one = Observed(lights=("a",), counts={"a": count_levels(np.full(100, 2, np.float32), 1.0)})
+    plan = plan_of(("a",))
+    flashes = tuple(replace(flash, lights={"a": planned}) for flash in plan.flashes)
+    assert said in power_words(replace(plan, flashes=flashes), one)["a"]
+
+
+@pytest.mark.parametrize(("gain", "weak"), [(0.15, False), (0.1, True)])
+def test_where_a_light_is_known_to_be_weaker_than_the_rig_says_no_turned_rig_is_named(gain: float, weak: bool) -> None:
+    one = Footage(lights=3, gains=[1.0, gain, 1.0], solved=True).observed(0)
+    one.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(0.0, 20.0, 0.0), rest_deg=0.2)]
+    one.slopes[:] = [0.9]
+    said = " ".join(line.found for line in rig_of(one))
+    one.slopes[:] = [0.2]
+    assert any("mirrored" in line.found for line in rig_of(one)) is not weak
+    assert ("swung to the left or right" in said) is not weak
+    assert ("'light1'" in said) is weak
+
+
+def test_under_three_lights_strengths_may_be_why_normals_lean() -> None:
+    one = Footage(lights=3, claimed_gain=2.0, solved=True).observed(0)
+    (line,) = rig_of(one)
+    assert line.grade != "good"
+    assert "directions or strengths" in line.found or "other strengths" in line.found
+    assert "exchanged" in line.found

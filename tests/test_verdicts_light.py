@@ -1,0 +1,217 @@
+"""What is said of exposure, curve and ambient light, on footage on either side of a border."""
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from judged_footage import (
+    ALL_WEAKER,
+    SEEDS,
+    SIZE,
+    Footage,
+    ball,
+    even,
+    exposure,
+    graded,
+    lamps,
+    looked_at,
+    plan_of,
+    rig_of,
+    ring,
+    timing_of,
+)
+
+from psvideo.clip import Masks
+from psvideo.model.camera import Encoding
+from psvideo.model.surface import Misfit, Surface
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.plates.sequence import AMBIENT, Round
+from psvideo.report.judge import of_motion, result
+from psvideo.report.judge.every_line import judgements
+from psvideo.report.judge.of_ambient import ambient
+from psvideo.report.judge.of_exposure import exposure as judge_exposure
+from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.observe.against_noise import AgainstNoise
+from psvideo.report.observe.kept_facts import KeptFacts
+from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.shadow import shadow_light
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.solving import Solving
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    ("times_noise", "grade"), [(80, "good"), (24, "good"), (13, "doubtful"), (7, "doubtful"), (3, "bad"), (1, "bad")]
+)
+@pytest.mark.parametrize(
+    ("transfer", "stops"), [("logc3", -6.4), ("slog3", -5.9), ("logc4", -11.0), ("st2084", -7.0), ("hlg", -4.5)]
+)
+def test_a_scene_far_below_its_curves_end_is_judged_by_its_noise(
+    transfer: str, stops: float, times_noise: float, grade: str, seed: int
+) -> None:
+    """LogC3 with diffuse white where it belongs was "not usable": 6.4 stops below the largest code, and 25 times its
+    noise."""
+    one = Footage(stops=stops, noise=2.0**stops / times_noise).observed(seed)
+    plan = plan_of(one.lights)
+    for white in (None, 50000.0):  # the plan may say where the sensor saturates
+        encoding = Encoding(transfer=transfer, white_level=white)
+        lines = judgements(replace(plan, camera=replace(plan.camera, encoding=encoding)), timing_of(), one)
+        assert graded(lines, "exposure") == grade
+        said = next(line.found for line in lines if line.subject == "exposure")
+        assert ("saturation" in said) == (white is not None)
+
+
+def test_a_bright_scene_is_not_dark_for_its_grain() -> None:
+    one = Footage(stops=-2, noise=0.05).observed(0)
+    assert graded(list(judge_exposure(one, under="the largest code")), "exposure") == "good"
+
+
+@pytest.mark.parametrize(("read", "photon"), [(1e-6, 0.0), (1e-7, 1e-4), (0.0, 1e-3)])
+def test_so_many_stops_more_light_is_as_many_times_its_noise(read: float, photon: float) -> None:
+    dim = AgainstNoise(level=0.003, read=read, photon=photon)
+    lit = replace(dim, level=dim.level * 2 ** dim.stops_to(25))
+    assert lit.ratio == pytest.approx(25)
+
+
+def test_a_subject_that_clips_everywhere_is_called_so_and_is_told_to_look_again() -> None:
+    lines = exposure(Footage(shape="waves", stops=3, noise=0).observed(0))
+    assert graded(lines, "clipping") == "bad"
+    assert "10 %" in next(line.advice for line in lines if line.subject == "clipping")
+
+
+def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_not_blamed() -> None:
+    one = Footage().observed(0)
+    misfit = Misfit(share=0.1, error_deg=3.1 / result.MEAN_OF_HELD)
+    one.facts = KeptFacts(
+        replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0, moving_share=1.0) for facts in one.facts
+    )
+    (lacking,) = result.validity(one)
+    assert "Move slower" in lacking.advice
+    (lacking,) = result.validity(one, first=result.first_of_all((), curve_doubted=True))
+    assert lacking.advice == result.CURVE_FIRST
+    said = list(judge_rig(one, curve_doubt="the files are tagged 'hlg'"))
+    assert [(line.grade, line.found) for line in said] == [("doubtful", "The files are tagged 'hlg'.")]
+
+
+def test_ambient_light_that_is_the_same_everywhere_is_called_a_black_level() -> None:
+    one = Footage().observed(0)
+    one.facts = KeptFacts(replace(facts, ambient=0.3) for facts in one.facts)
+    for evenness, named in ((0.95, True), (0.5, False)):
+        one.dark_evenness = array("d", [evenness])
+        assert ("black_level" in ambient(one).advice) == named
+        assert ambient(one).grade == "doubtful"
+
+
+@pytest.mark.parametrize(("shape", "named"), [("ball", True), ("card", False)])
+def test_even_ambient_light_over_an_even_card_is_no_black_level(shape: str, named: bool) -> None:
+    one = Footage(shape=shape, ambient=(0.3,)).observed(0)
+    assert ("black_level" in ambient(one).advice) == named
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("around", "grade"), [(0.0, "unknown"), (0.025, "unknown"), (0.06, "doubtful")])
+def test_light_that_is_left_in_attached_shadow_is_said_where_no_dark_slot_shows_it(
+    around: float, grade: str, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    ways = ring(6) * [1.7, 1.7, 0.6]
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    normals, albedo = ball(0)
+    shades = [albedo * (np.maximum(normals @ way, 0) + around) for way in ways]
+    plates = [(shade + rng.normal(0, 0.001, shade.shape)).astype(np.float32) for shade in shades]
+    surface = Solving().solve(plates, Illumination(directions=ways, intensities=np.ones((6, 1))))
+    left = shadow_light(np.array(plates), np.ones((6, SIZE, SIZE), np.bool_), surface, ways, step=1)
+    assert left is not None
+    one = Observed(lights=("a",), in_shadow=[left])
+    assert ambient(one).grade == grade
+
+
+@pytest.mark.parametrize(("ambient", "said"), [(0.03, False), (0.08, True)])
+def test_ambient_light_that_no_flash_freezes_is_said_with_its_blur_and_its_lean(ambient: float, said: bool) -> None:
+    plan = replace(plan_of(["a"], fps=1), mode="rolling")
+    timing = timing_of(frame_period_s=1.0, exposure_s=0.5, row_time_s=1.0 / SIZE)
+    one = Footage(shape="waves", lights=1, rounds=4, shift_px=4).observed(0)
+    one.facts = KeptFacts(replace(facts, ambient=ambient) for facts in one.facts)
+    found = of_motion.motion(plan, timing, one).found
+    assert ("do not freeze the ambient light, 8 % of the signal" in found) == said
+    speed_px_s = float(np.median([facts.speed_px_s or 0.0 for facts in one.facts[1:]]))
+    assert not said or f"blurs by up to {0.5 * speed_px_s:.0f} px and leans by {speed_px_s:.0f} px" in found
+
+
+@pytest.mark.parametrize(
+    ("unseen", "dark_unseen"), [((0, 0), 0), ((SIZE, SIZE), 0), ((0, 0), SIZE // 2), ((SIZE, 8), SIZE // 4)]
+)
+def test_ambient_lights_share_is_of_what_was_seen(unseen: tuple[int, int], dark_unseen: int) -> None:
+    plates = [even("a", 0.46), *(even(name, 0.46, unseen=slice(rows)) for name, rows in zip("bc", unseen, strict=True))]
+    observed = looked_at(plates, even(AMBIENT, 0.04, unseen=slice(dark_unseen)))
+    assert observed.facts[0].ambient == pytest.approx(0.08)
+
+
+def test_what_is_dim_where_no_frame_saw_the_dark_slot_does_not_make_it_uneven() -> None:
+    lit = LightPlate(
+        light="a", number=1001, time_s=0.0, seen=np.ones(SIZE, np.bool_),
+        picture=mixture_of(np.tile(np.linspace(0.1, 0.9, SIZE, dtype=np.float32), (SIZE, 1))),
+    )  # fmt: skip
+    observed = looked_at([lit], even(AMBIENT, 0.04, unseen=slice(SIZE // 2)))
+    assert observed.dark_evenness[0] == pytest.approx(1)
+
+
+def test_the_share_that_clips_is_of_what_was_seen() -> None:
+    observed = looked_at([even("a", 0.5, unseen=slice(SIZE // 2), clips=0.25), even("b", 0.5)])
+    assert observed.facts[0].clipped == (0.25, 0.0)
+    assert observed.levels("a").clipped_share == pytest.approx(0.25)
+
+
+def test_a_mask_that_slips_between_the_points_looked_at_is_not_called_dark() -> None:
+    mask = np.zeros((SIZE, SIZE), np.bool_)
+    mask[:, 13:16] = True
+    one = looked_at([even(name, 0.5) for name in "abc"], masks=Masks(still=mask))
+    assert [(line.subject, line.grade) for line in (*exposure(one), *lamps(one))] == [("mask", "doubtful")]
+    solved = Surface(
+        normals=np.tile(np.array([0, 0, 1], np.float32), (SIZE, SIZE, 1)),
+        albedo=np.ones((SIZE, SIZE), np.float32),
+        valid=mask,
+    )
+    one.add(Round(number=1002, plates=tuple(even(name, 0.5) for name in "abc")), solved)
+    assert one.facts[1].valid_share is None
+
+
+@pytest.mark.parametrize("powers", [ALL_WEAKER, (0.2, 0.5, 1.0, 0.3)])
+@pytest.mark.parametrize("shape", ["ball", "waves"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_right_curve_is_not_doubted_where_flashes_are_weaker_than_full(
+    shape: str, powers: Sequence[float], seed: int
+) -> None:
+    """All that lay above 1.0 was bent to one value, which any rig explains."""
+    right, wrong = (
+        Footage(
+            shape=shape, lights=4, noise=0.0002, gains=powers, powers=powers, recorded=recorded, solved=True
+        ).observed(seed)
+        for recorded in ("linear", "srgb")
+    )
+    assert graded(rig_of(right), "rig") == "good"
+    assert any("recorded as sRGB" in line.found for line in rig_of(wrong))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("powers", [(1.0,), ALL_WEAKER])
+def test_ambient_light_is_compared_with_what_the_flash_gave_not_with_a_full_one(
+    powers: Sequence[float], seed: int
+) -> None:
+    just_good, just_bad = (
+        ambient(Footage(lights=4, ambient=[share], powers=powers).observed(seed)) for share in (0.09, 0.11)
+    )
+    assert (just_good.grade, just_bad.grade) == ("good", "doubtful")
+
+
+@pytest.mark.parametrize("clip", [0.016, 0.2])
+def test_a_clipped_take_is_not_told_to_give_more_light(clip: float) -> None:
+    one = Footage(lights=3, clip=clip, clipping=3, noise=0, solved=True, dark=0.7).observed(0)
+    lines = judgements(plan_of(one.lights), timing_of(), one)
+    (lacking,) = (line for line in lines if line.subject == "validity")
+    assert lacking.grade != "good"
+    assert ("more light," in lacking.advice) == (clip < 0.02)
+    assert (lacking.advice == result.CLIPPING_FIRST) == (clip > 0.02)

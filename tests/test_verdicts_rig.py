@@ -1,0 +1,228 @@
+"""What is said of a rig: doubted where it cannot have made the plates, and not for what surfaces and lenses do."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from judged_footage import (
+    SEEDS,
+    SIZE,
+    Footage,
+    accuracy,
+    graded,
+    plan_of,
+    rig_but_leaning,
+    rig_of,
+    ring,
+    timing_of,
+    validity,
+)
+
+from psvideo.model.surface import Misfit, Surface
+from psvideo.model.turn import CLOCKWISE, UPRIGHT
+from psvideo.report.judge import result
+from psvideo.report.judge.every_line import judgements
+from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judge.rig_of_three import STRONGER, turned_deg
+from psvideo.report.judgement import verdict_of
+from psvideo.report.observe.kept_facts import KeptFacts
+from psvideo.report.observe.rig_and_curve.slopes import coarse_normals
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
+
+
+@pytest.mark.parametrize(
+    ("shape", "footage", "share", "grade"),
+    [
+        ("ball", {"claimed_deg": 7}, 0.06, "doubtful"),
+        ("waves", {"claimed_deg": 7}, 0.06, "doubtful"),
+        ("ball", {"claimed_deg": 7}, 0.04, "bad"),  # hardly a normal is trusted, whatever is to blame
+        ("ball", {"claimed_deg": 19}, 0.06, "bad"),  # the rig does not explain the light
+        ("waves", {"noise": 0.03}, 0.06, "bad"),
+    ],
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_of_four_lights_that_the_rig_nearly_explains_a_twentieth_must_be_trusted(
+    shape: str, footage: dict[str, Any], share: float, grade: str, seed: int
+) -> None:
+    one = Footage(shape=shape, lights=4, rounds=2, solved=True, **footage).observed(seed)
+    one.facts = KeptFacts(replace(facts, valid_share=share, measured_share=1.0) for facts in one.facts)
+    assert graded(validity(one), "validity") == grade
+
+
+@pytest.mark.parametrize(("claimed_deg", "grade"), [(0, "good"), (3, "good"), (8, "unknown")])
+@pytest.mark.parametrize("shape", ["ball", "waves"])
+def test_four_lights_that_leave_what_wrong_directions_would_do_not_show_the_rig_to_be_right(
+    shape: str, claimed_deg: float, grade: str
+) -> None:
+    for seed in range(3):
+        one = Footage(shape=shape, lights=4, claimed_deg=claimed_deg, solved=True).observed(seed)
+        assert {line.grade for line in rig_but_leaning(one) if line.subject == "rig"} == {grade}
+
+
+def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s() -> None:
+    one = Footage().observed(0)
+    one.slopes[:] = [-0.2]
+    guessed, known = (
+        " ".join(f"{line.found} {line.advice}" for line in judge_rig(one, guessed=g)) for g in (True, False)
+    )
+    assert "the order of the lights is a guess" in guessed
+    assert "first_light" in guessed
+    assert "camera axes" not in guessed
+    assert "camera axes" in known
+
+
+def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_not_blamed_alone() -> None:
+    one = Footage(solved=True).observed(0)
+    one.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(20.0, 0.0, 0.0), rest_deg=0.2)]
+    (line,) = rig_of(one)
+    assert (line.grade, "tilted up or down as a whole by about 20 degrees" in line.found) == ("bad", True)
+    assert one.points is not None
+    one.points = replace(one.points, vectors=one.points.vectors * [1, 1, 0.05])
+    one.light_at_points.clear()
+    (line,) = (each for each in rig_of(one) if "lean" in each.found)
+    assert (line.grade, "nearly in a plane" in line.found) == ("doubtful", True)
+    one.facts = KeptFacts(replace(facts, clipped_share=0.2) for facts in one.facts)
+    assert not any("lean" in each.found for each in rig_of(one)), "what clips leans normals, too"
+
+
+def lenses(*, right: float, tilt_deg: float, width: float = 0.6) -> np.ndarray:
+    """Return normals of a wall of waves seen through a lens, ``width`` the picture's over the focal length, whose axis
+    lies so many widths ``right`` of its middle, turned by an angle around the picture's columns."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    x, y = width * (cols / SIZE - right), -width * rows / SIZE
+    far = np.ones_like(x)
+    for _ in range(50):  # the wall stands at 1 and swells by height(x, y)
+        height, across, up = _swell(x * far, y * far)
+        far = 1 - height
+    normals = np.stack([-across, -up, np.ones_like(up)], axis=-1)
+    turn = np.radians(tilt_deg)
+    turned = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+    return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True) @ turned.T)
+
+
+def _swell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a height and its slopes."""
+    one, other = 20 * x + 14 * y, 24 * y - 8 * x
+    height = 0.02 * (np.sin(one) + np.cos(other))
+    return height, 0.02 * (20 * np.cos(one) + 8 * np.sin(other)), 0.02 * (14 * np.cos(one) - 24 * np.sin(other))
+
+
+@pytest.mark.parametrize(
+    ("right", "tilt_deg", "lens", "subject"),
+    [
+        (0.0, 0, None, "nothing"),
+        (0.3, 0, None, "lens"),  # a shifted lens and a right rig
+        (0.3, 0, Lens(width=0.6, right=0.3), "nothing"),
+        (0.0, 9, Lens(width=0.6), "rig"),
+        (0.0, 9, None, "lens"),  # which of them it is, nobody can tell
+        (0.0, 25, None, "rig"),  # no lens shifts so far
+    ],
+)
+def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_explain(
+    right: float, tilt_deg: float, lens: Lens | None, subject: str
+) -> None:
+    one = Footage(solved=True).observed(0)
+    normals = lenses(right=right, tilt_deg=tilt_deg).astype(np.float32)
+    surface = Surface(
+        normals=normals, albedo=np.ones((SIZE, SIZE, 1), np.float32), valid=np.ones((SIZE, SIZE), np.bool_)
+    )
+    found = lean(coarse_normals(surface), lens=lens)
+    assert found is not None
+    one.leans[:] = [found]
+    doubted = [line for line in rig_of(one) if line.grade != "good"]
+    assert [line.subject for line in doubted] == ([] if subject == "nothing" else [subject])
+    assert verdict_of(doubted).startswith("This take is usable") == (subject != "rig")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> None:
+    satin = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(seed)
+    fit = satin.rig_fit
+    assert fit is not None
+    assert fit.near is not None
+    assert fit.near.misfit < 0.8 * fit.misfit  # lamps would explain it, too
+    assert fit.near.by_surface < fit.near.misfit
+    assert not any("stand near" in line.found for line in rig_of(satin))
+
+
+def test_a_rig_is_fitted_once_until_more_is_seen() -> None:
+    seen = Footage(shape="ball", lights=6, solved=True, rounds=3).observed(0)
+    fit = seen.rig_fit
+    assert fit is not None
+    assert seen.rig_fit is fit  # a report asks three times
+    dimmed = seen.light_at_points[0]
+    seen.light_at_points.append(dimmed._replace(light=0.5 * dimmed.light))
+    wider = seen.rig_fit
+    assert wider is not fit
+    assert wider is not None
+    assert seen.points is not None
+    assert wider == seen.points.fit(seen.light_at_points, seen.firing)
+
+
+@pytest.mark.parametrize("lights", [3, 5])
+def test_three_lights_do_not_show_how_far_normals_are_off_and_that_is_said(lights: int) -> None:
+    said = accuracy(Footage(lights=lights, solved=True).observed(0))
+    grades = [line.grade for line in said if "three lights explain any surface" in line.found]
+    assert grades == (["unknown"] if lights == 3 else [])
+    assert all("cannot check each other" in line.found for line in said if line.grade == "unknown")
+
+
+@pytest.mark.parametrize(("share", "grades"), [(0.09, []), (0.11, ["doubtful"])])
+def test_what_is_not_known_of_near_lights_distance_is_said_and_not_laid_upon_the_surface(
+    share: float, grades: list[str]
+) -> None:
+    one = Footage().observed(0)
+    misfit = Misfit(share=0.01, error_deg=1.0, distance_share=share)
+    one.facts = KeptFacts(replace(facts, misfit=misfit, valid_share=0.4, measured_share=1.0) for facts in one.facts)
+    assert [line.grade for line in result.distance(one)] == grades
+    (lacking,) = validity(one)
+    assert ("line on distance" in lacking.advice) is bool(grades)
+    assert [line.grade for line in accuracy(one)] == ["good"]
+
+
+@pytest.mark.parametrize("noise", [0.0005, 0.01])
+@pytest.mark.parametrize("lights", [3, 6])
+@pytest.mark.parametrize("shape", ["pipe", "bottle"])
+def test_pipes_and_bottles_under_a_right_rig_are_not_doubted(shape: str, lights: int, noise: float) -> None:
+    """Upright, they change in one direction only: what was left across was held against the rig."""
+    one = Footage(shape=shape, lights=lights, noise=noise, solved=True).observed(1)
+    assert "doubtful" not in {line.grade for line in rig_of(one)}
+
+
+@pytest.mark.parametrize(("gain", "doubted"), [(1.0, False), (2.0, True)])
+def test_under_a_doubted_rig_more_light_is_not_what_lacks(gain: float, doubted: bool) -> None:
+    one = Footage(shape="waves", lights=4, claimed_gain=gain, solved=True).observed(0)
+    one.facts = KeptFacts(replace(facts, valid_share=0.1, measured_share=1.0) for facts in one.facts)
+    lines = judgements(plan_of(one.lights), timing_of(), one)
+    assert (graded(lines, "rig") != "good") == doubted
+    assert (next(line.advice for line in lines if line.subject == "validity") == result.RIG_FIRST) == doubted
+
+
+@pytest.mark.parametrize("lights", [3, 4])
+def test_a_rig_that_is_turned_beside_a_clip_that_is_turned_too_is_told_of_it(lights: int) -> None:
+    for turn in (UPRIGHT, CLOCKWISE):
+        one = Footage(lights=lights, turned_deg=90, solved=True, shape="waves").observed(0)
+        one.turn = turn
+        said = " ".join(line.found for line in rig_but_leaning(one))
+        assert "directions are mirrored or turned" in said
+        assert ("turned by 90 degrees clockwise" in said) is (turn == CLOCKWISE)
+
+
+@pytest.mark.parametrize(("gain", "unmeasured"), [(1.0, True), (1.1, False)])
+def test_three_lights_do_not_show_the_rig_to_be_right(gain: float, unmeasured: bool) -> None:
+    """One light is as strong as the rig says or a tenth weaker: nothing shows it, so nothing is called good."""
+    (line,) = rig_of(Footage(lights=3, claimed_gain=gain, solved=True).observed(0))
+    assert line.grade == "unknown"
+    assert "other strengths or with two lights exchanged" in line.found
+    assert "flat-field" in line.advice
+    assert ("the strength 1" in line.found) is unmeasured
+
+
+def test_a_light_that_is_stronger_than_the_rig_says_turns_normals_as_far_as_is_said() -> None:
+    vectors = ring(3)
+    shades = vectors @ np.array([0, 0, 1]) * np.array([1, STRONGER, 1])
+    normal = np.linalg.solve(vectors, shades)
+    off_deg = float(np.degrees(np.arccos(normal[2] / np.linalg.norm(normal))))
+    assert off_deg > 3
+    assert turned_deg(vectors) == pytest.approx(off_deg), "lights in a ring all do the same"

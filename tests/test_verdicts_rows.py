@@ -1,0 +1,204 @@
+"""What is said of rows, frames, times and motion: which were seen, which are missing, and what is to blame."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from judged_footage import SIZE, Footage, even, facts_of, graded, looked_at, plan_of, ring, tiles, timing_of
+
+from psvideo.model.timing import DroppedFrames
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.report.html import _timing
+from psvideo.report.judge import of_motion, of_rows, of_timing, result
+from psvideo.report.judge.of_frames import frame_light
+from psvideo.report.observe.kept_facts import KeptFacts
+from psvideo.report.observe.motion import glimpse, motion_between
+from psvideo.report.observe.observed import Observed
+
+GOOD = Footage()
+
+
+def timed(**changed: Any) -> str:
+    return graded(list(of_timing.timing_and_order(timing_of(**changed), "rolling")), "timing")
+
+
+def covered(subject: str, footage: Footage = GOOD, *, dark_s: float = 0.01, **changed: Any) -> str:
+    """Return what is said of rows under a rolling plan of 5 ms flashes with this dark time, at an exposure of 10 ms."""
+    plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
+    return graded(list(of_rows.coverage(plan, timing_of(**changed), footage.observed(0))), subject)
+
+
+def moved(px_per_flash: float, *, aligned: bool = False) -> str:
+    """Return what is said of paint that moves by so much from flash to flash of one light, a flash a second."""
+    one = Footage(shape="waves", lights=1, rounds=4, shift_px=px_per_flash).observed(0)
+    return graded(
+        of_motion.motion(plan_of(one.lights, fps=1), timing_of(frame_period_s=1.0), one, aligned=aligned), "motion"
+    )
+
+
+def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> None:
+    assert [timed(phase_error_rows=rows) for rows in (0.28, 0.32, 1.9, 2.1)] == ["good", "doubtful", "doubtful", "bad"]
+    assert [covered("rows", dark_s=dark_s) for dark_s in (0.00985, 0.0097, 0.0077, 0.0073)] == [
+        "good", "doubtful", "doubtful", "bad"
+    ]  # fmt: skip
+    unseen = [covered("rows", Footage(unseen=share)) for share in (0.01, 0.04, 0.28, 0.33)]
+    assert unseen == ["good", "doubtful", "doubtful", "bad"]
+    borrowed = [covered("rows", Footage(borrowed=share), exposure_s=open_s) for share, open_s in
+                ((0.01, 0.005), (0.2, 0.00975), (0.2, 0.0096))]  # fmt: skip
+    assert borrowed == ["good", "good", "doubtful"]
+    assert covered("frames", dropped_frames=(DroppedFrames(after=3, count=1),)) == "doubtful"
+    assert [moved(px) for px in (0, 1, 2, 4, 5)] == ["good", "good", "doubtful", "doubtful", "bad"]
+    assert moved(5, aligned=True) == "doubtful"
+
+
+def test_rows_whose_ambient_light_no_part_of_a_flash_tells_are_not_laid_to_the_shutter() -> None:
+    plan, one = plan_of(["a"], mode="rolling", dark_s=0.01), Footage(unseen=0.1).observed(0)
+    (said,) = of_rows.coverage(plan, timing_of(), one)
+    assert said.grade == "doubtful"
+    assert "dark slot" in said.advice
+    assert "360" not in said.advice
+    assert graded(list(of_rows.coverage(plan, timing_of(), one, take_s=5.0)), "rows") == "good"
+    dark = replace(plan, flashes=(*plan.flashes, replace(plan.flashes[0], lights={})))
+    assert "360" in next(of_rows.coverage(dark, timing_of(), one)).advice
+
+
+def test_rows_that_the_rest_of_the_take_shows_are_not_lost_unless_the_strobe_keeps_step() -> None:
+    """Below 360 degrees a part of a take shows fewer rows than all of it."""
+
+    def said(dark_s: float, take_s: float | None) -> tuple[str, str]:
+        plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
+        found = list(
+            of_rows.coverage(plan, timing_of(exposure_s=0.005), Footage(unseen=0.5).observed(0), take_s=take_s)
+        )
+        return graded(found, "rows"), " ".join(f"{one.found} {one.advice}" for one in found)
+
+    flash_s = plan_of(["a"], mode="rolling", dark_s=0.01).flashes[0].duration_s
+    assert said(0.0105, 5.0)[0] == "doubtful"
+    assert said(0.0105, None)[0] == "bad"
+    for take_s in (None, 5.0):
+        grade, words = said(0.01 - flash_s, take_s)
+        assert grade == "bad"
+        assert "keeps step" in words
+        assert "dark_s" in words
+
+
+@pytest.mark.parametrize("passing", [False, True])
+def test_motion_and_sharpness_are_looked_for_in_plates_that_are_lit_where_the_first_light_is_dead(
+    passing: bool,
+) -> None:
+    dark = Footage(shape="tiles", lights=4, gains=[0, 1, 1, 1], noise=0.001)
+    rounds = [dark._round([f"light{n}" for n in range(4)], plates, plates, number)
+              for number, plates in enumerate(_tiles_that_move(dark, 3))]  # fmt: skip
+    one = Observed(lights=rounds[0].lights)
+    for each in rounds:
+        for plate in each.plates if passing else ():
+            one.look(plate)
+        one.add(each)
+    assert one.watched == "light1"
+    assert one.blurs_px
+    assert one.blurs_px[0] < result.SOFT_PX
+    assert [facts.moving_share is not None and facts.moving_share > 0.05 for facts in one.facts[1:]] == [True, True]
+
+
+def _tiles_that_move(footage: Footage, rounds: int) -> list[list[np.ndarray]]:
+    rng = np.random.default_rng(0)
+    each = []
+    for number in range(rounds):
+        clean = [np.roll(one, 4 * number, axis=1) for one in footage._plates(ring(footage.lights), 0)]
+        each.append([(one + rng.normal(0, footage.noise, one.shape)).astype(np.float32) for one in clean])
+    return each
+
+
+def test_what_is_clipped_does_not_seem_to_move_where_the_rows_that_two_frames_share_roll() -> None:
+    """Two halves of a flash, each below saturation, add up to more than a whole one that is clipped."""
+
+    def plate(number: int) -> LightPlate:
+        light = 2 * tiles(0)[1]
+        shared = (np.arange(SIZE) - 24 * number) % SIZE < 24
+        clipped = np.where(shared[:, None], light, np.minimum(light, 1)).astype(np.float32)
+        return LightPlate(
+            light="a", number=number, time_s=float(number), picture=mixture_of(clipped), seen=np.ones(SIZE, np.bool_)
+        )
+
+    one = glimpse(plate(0))
+    found = motion_between(one, glimpse(plate(1), one.white))
+    assert found is not None
+    assert (found.speed_px_s, found.share) == (0, 0)
+
+
+@pytest.mark.parametrize("hole", [(), (DroppedFrames(after=7, count=1),)])
+def test_rows_that_nobody_saw_are_judged_beside_a_missing_frame(hole: tuple[DroppedFrames, ...]) -> None:
+    timing = replace(timing_of(), dropped_frames=hole, repeated_frames=(9,))
+    one = Observed(lights=("a",), facts=KeptFacts([facts_of(unseen_share=0.8)]))
+    lines = list(of_rows.coverage(plan_of(("a",)), timing, one))
+    assert (lines[0].subject, lines[0].grade) == ("rows", "bad")
+    assert {line.subject for line in lines} == {"rows", "frames"}
+
+
+def test_every_row_is_said_to_be_seen_only_where_every_row_was() -> None:
+    found = []
+    for share in (0.0, 0.015):
+        one = Observed(lights=("a",), facts=KeptFacts([facts_of(unseen_share=share)]))
+        (line,) = of_rows.coverage(plan_of(("a",)), timing_of(), one)
+        found.append((line.grade, line.found.split(" seen")[0]))
+    assert found == [("good", "Every row of every round was"), ("good", "All but 1.5 % of the rows were")]
+
+
+def test_motion_in_a_few_rounds_is_said() -> None:
+    speeds = [0.0] * 19 + [900.0]
+    rounds = [facts_of(moving_share=0.1 if speed else 0.0, speed_px_s=speed) for speed in speeds]
+    one = Observed(lights=("a",), facts=KeptFacts(rounds))
+    line = of_motion.motion(plan_of(("a",)), timing_of(), one)
+    assert "Nothing moves" not in line.found
+    assert "In nine of ten rounds" in line.found
+
+
+def test_frames_with_values_that_are_no_numbers_are_judged_by_the_others() -> None:
+    image = np.full((40, 40), 0.5, np.float32)
+    image[0, 0] = np.nan
+    assert frame_light(image).top == pytest.approx(0.5)
+
+
+def test_rows_that_nobody_saw_are_not_borrowed() -> None:
+    shown_s = np.zeros(SIZE)
+    shown_s[24:36] = 1.0
+    plate = replace(even("a", 0.5, unseen=slice(24)), shown_s=shown_s)
+    assert looked_at([plate]).facts[0].borrowed_share == pytest.approx(12 / SIZE)
+
+
+@pytest.mark.parametrize(("opened", "mode", "said"), [(0.9, "rolling", False), (1.0, "synced", True)])
+def test_rows_that_a_closed_shutter_costs_are_not_laid_to_a_missing_frame(opened: float, mode: str, said: bool) -> None:
+    timing = timing_of(exposure_s=0.01 * opened, dropped_frames=(DroppedFrames(after=3, count=1),))
+    one = Observed(lights=("a",), facts=KeptFacts([facts_of(unseen_share=0.1)] * 12))
+    lines = list(of_rows.coverage(plan_of(("a",), mode=mode, dark_s=0.01), timing, one))
+    assert ("spoils 12 of 12 rounds" in next(line.found for line in lines if line.subject == "frames")) == said
+
+
+@pytest.mark.parametrize(
+    ("known", "words"),
+    [
+        ({"row_time_s": 0.0, "phase_error_rows": 0.05, "phase_error_s": 2e-6}, "2 us"),
+        ({"phase_error_rows": 0.05, "phase_error_s": 5e-6}, "5 us, 0.05 row"),
+        ({"phase_error_rows": 0.05}, "0.05 row"),
+        ({"phase_error_rows": 0.0}, "not fitted"),
+    ],
+)
+def test_the_report_says_how_sure_flash_times_are_as_the_timing_does(known: dict[str, float], words: str) -> None:
+    timing = timing_of(**known)
+    report: Any = SimpleNamespace(timing=timing)
+    assert f"<td>{words}</td>" in _timing(report)
+    assert timing.how_sure == ("" if words == "not fitted" else f"Flash times are known to {words}.")
+
+
+@pytest.mark.parametrize(("spoilt", "rounds", "grade"), [(1, 8, "nothing"), (2, 20, "nothing"), (3, 20, "bad")])
+def test_a_missing_frame_costs_its_rounds_and_not_the_take(spoilt: int, rounds: int, grade: str) -> None:
+    """One lost frame of 120 took 31 % of one round's rows of 28, and the take was "not usable"."""
+    timing = timing_of(dropped_frames=(DroppedFrames(after=50, count=1),))
+    facts = [facts_of(number=1001 + n, unseen_share=0.31 if n < spoilt else 0.0) for n in range(rounds)]
+    lines = list(of_rows.coverage(plan_of(("a",)), timing, Observed(lights=("a",), facts=KeptFacts(facts))))
+    assert graded(lines, "rows") == grade
+    assert graded(lines, "frames") == "doubtful"
+    assert not any("360" in line.advice for line in lines)
