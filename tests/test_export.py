@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import io
 import resource
 import subprocess
 import sys
@@ -432,6 +433,24 @@ def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     assert "cannot be written" in said
     assert not list(tmp_path.iterdir())
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 4096
+
+
+class _FullForAMoment(io.BytesIO):
+    """A file on a disk that is full when its writer goes back in it, and has room again when it is closed."""
+
+    def seek(self, place: int, whence: int = 0, /) -> int:
+        if whence == 0 and place < self.tell():
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().seek(place, whence)
+
+
+def test_a_disk_that_is_full_while_a_file_s_table_is_written_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """OpenEXR swallows it, and the picture was taken for whole with a table of zeros."""
+    monkeypatch.setattr(Path, "open", lambda *_: _FullForAMoment())
+    with pytest.raises(PsvideoError, match="No space left on device"):
+        write_exr(tmp_path / "a.exr", {"Y": np.ones((20, 20), np.float32)})
 
 
 @pytest.mark.parametrize("compression", get_args(Compression))

@@ -350,7 +350,7 @@ def test_errors_count_more_where_four_lights_check_each_other_less() -> None:
         surface = Solving(error=True).solve(case.plates, case.lit, mask=inside)
         assert surface.error_deg is not None
         ratios.append(np.median(surface.error_deg[inside]) / np.median(angles_deg(surface.normals, normals)[inside]))
-    assert ratios[0] < 2.2 * ratios[1]
+    assert ratios[0] < 2.3 * ratios[1]  # by their number alone 2.45
     assert min(ratios) > 0.75
 
 

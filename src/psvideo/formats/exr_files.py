@@ -185,18 +185,35 @@ def write_exr_parts(
 
 
 class _Stream:
-    """A file that OpenEXR writes into; large planes that it reads go back to the system's cache meanwhile."""
+    """A file that OpenEXR writes into; large planes that it reads go back to the system's cache meanwhile.
+
+    ``fault`` is what went wrong first: OpenEXR swallows what does while it closes a file, where it goes back to write
+    the table of its chunks, and a disk that was full then may have room again when Python closes it.
+    """
 
     def __init__(self, file: BinaryIO, planes: Sequence[NDArray[np.floating]]) -> None:
         self._file, self._planes, self._written = file, planes, 0
-        self.seek, self.tell = file.seek, file.tell
+        self.fault: OSError | None = None
 
     def write(self, data: bytes) -> int:
         self._written += len(data)
         if self._written > LET_GO_EACH_BYTES:
             let_go(*self._planes)
             self._written = 0
-        return self._file.write(data)
+        return self._noted(lambda: self._file.write(data))
+
+    def seek(self, place: int, whence: int = 0) -> int:
+        return self._noted(lambda: self._file.seek(place, whence))
+
+    def tell(self) -> int:
+        return self._noted(self._file.tell)
+
+    def _noted(self, do: Callable[[], int]) -> int:
+        try:
+            return do()
+        except OSError as fault:
+            self.fault = self.fault or fault
+            raise
 
 
 def _write(
@@ -205,7 +222,10 @@ def _write(
     """Write what is built of ``planes`` to the file ``beside``, which stands for ``path`` until it is whole."""
     try:
         with beside.open("wb") as file:
-            build().write(_Stream(file, planes))
+            stream = _Stream(file, planes)
+            build().write(stream)
+            if stream.fault is not None:
+                raise stream.fault
             let_go(*planes)
     except RuntimeError as fault:  # what OpenEXR raises for all its faults
         raise PsvideoError(f"{path}: OpenEXR cannot encode this picture: {fault}") from fault
