@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,12 +21,27 @@ ENDS_S = 2.9
 """The end of a process waits for threads for 3 s."""
 
 
-@pytest.mark.parametrize("number", ENDING)
+@pytest.fixture(params=ENDING)
+def number(request: pytest.FixtureRequest) -> Iterator[int]:
+    """A signal that asks a program to end, obeyed whatever the tests were started by: nohup ignores SIGHUP."""
+    asked = int(request.param)
+    before = signal.signal(asked, signal.default_int_handler)
+    yield asked
+    signal.signal(asked, before)
+
+
 def test_what_asks_a_program_to_end_stops_it_as_ctrl_c_does(number: int) -> None:
     before = signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt), stoppable():
         os.kill(os.getpid(), number)
     assert signal.getsignal(number) == before
+
+
+def test_a_signal_that_is_ignored_stays_so(number: int) -> None:
+    """As under nohup, which is there to let a run go on."""
+    signal.signal(number, signal.SIG_IGN)
+    with stoppable():
+        os.kill(os.getpid(), number)
 
 
 def test_a_stop_that_falls_into_a_call_back_from_c_is_a_stop_and_no_fault() -> None:
