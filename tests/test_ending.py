@@ -42,6 +42,8 @@ def test_a_signal_that_is_ignored_stays_so(number: int) -> None:
     signal.signal(number, signal.SIG_IGN)
     with stoppable():
         os.kill(os.getpid(), number)
+        assert signal.getsignal(number) is signal.SIG_IGN
+    assert signal.getsignal(number) is signal.SIG_IGN
 
 
 def test_a_stop_that_falls_into_a_call_back_from_c_is_a_stop_and_no_fault() -> None:

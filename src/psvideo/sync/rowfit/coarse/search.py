@@ -28,7 +28,7 @@ LOW = 0.15
 
 
 class TriedClocks(NamedTuple):
-    """TriedClocks to try: what ``FoundClock`` holds of each, (clock,). A grid has a hundred thousand."""
+    """Clocks to try: what ``FoundClock`` holds of each, (clock,). A grid has a hundred thousand."""
 
     phase_s: Doubles
     offset_ppm: Doubles
