@@ -345,7 +345,7 @@ def test_parts_between_which_frames_are_missing_are_one_strobe(plan: Plan, monke
     shot = shot_of(plan, frames=FRAMES + 1)
     profiles = np.delete(shot.frames.mean(axis=2, dtype=np.float64), BREAK, axis=0)
     parts = parts_of(plan, rows_of(plan, profiles), [slice(0, BREAK - 9), slice(BREAK + 15, FRAMES)])
-    monkeypatch.setattr("psvideo.sync.find.found_in_parts", lambda *_: parts)
+    monkeypatch.setattr("psvideo.sync.clip_parts.found_in_parts", lambda *_: parts)
     timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
     assert timing.dropped_frames == (DroppedFrames(after=BREAK - 1, count=1),)
     assert off_s(timing, (shot, shot), plan.camera.frame_period_s).max() < 0.05 * plan.camera.row_time_s

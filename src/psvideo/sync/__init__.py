@@ -4,7 +4,8 @@
 fits them, ``verdict`` decides whether the fit is believed, ``turns`` and ``order_by_rig`` say which flash is which
 light, ``flashes_seen`` lists them, ``unfired`` finds those that never fired, ``silent`` where the strobe may have
 paused for that, ``black_frames`` those whose frames were lost, and ``beside_breaks`` those in frames that nothing is
-sure of; ``marks`` puts these together. Where the strobe began again, ``restarted`` finds each part of the clip by
-itself, ``unbroken`` says whether they are one strobe after all, and ``joined`` makes one timing of them.
+sure of; ``marks`` puts these together. ``named_strobe`` is a fit whose flashes have names, ``frames_taken`` gives the
+timing of the frames that it was found in. Where the strobe began again, ``restarted`` finds each part of the clip by
+itself, ``unbroken`` says whether they are one strobe after all, ``clip_parts`` decides, ``joined`` makes one timing.
 ``shared_flashes`` compares the clocks of several cameras, whose plans ``same_strobe`` compares first.
 """
