@@ -28,8 +28,8 @@ test-all: test campaigns
 
 # What is killed, cut into pieces, damaged or full: the suites of faults, with their campaigns
 test-faults: $(VENV)/.installed-test
-	$(PYTEST) tests/test_killed.py tests/test_ending.py tests/test_hostile.py tests/test_pieces.py tests/test_files.py tests/test_threads.py \
-		tests/test_strobe_emulated.py
+	$(PYTEST) tests/test_killed.py tests/test_ending.py tests/test_hostile.py tests/test_pieces.py tests/test_piece_notes.py tests/test_workers.py \
+		tests/test_files.py tests/test_threads.py tests/test_strobe_emulated.py
 
 coverage: checks
 	$(PYTEST) -m "not campaign" --cov --cov-report term:skip-covered --cov-report html
