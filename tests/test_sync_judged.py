@@ -13,7 +13,7 @@ from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.normal_equations import solved
 from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
-from psvideo.synth import Noise, TrueClock, expose
+from psvideo.synth import Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
 ROWS, COLUMNS, FRAMES = 64, 12, 48
@@ -200,6 +200,43 @@ def test_lights_that_all_flash_at_once_are_recognised(plan: Plan) -> None:
 def test_gain_that_jumps_from_frame_to_frame_is_said(plan: Plan) -> None:
     gain = np.exp(0.15 * np.random.default_rng(2).standard_normal(FRAMES))
     assert any("gain by itself" in note for note in timing_of(plan, filmed(plan, gain=gain)).notes)
+
+
+def swinging(plan: Plan, seed: int) -> np.ndarray:
+    """Return the row profiles of a scene whose every flash gives another amount of light, with 6 % between them."""
+    rng = np.random.default_rng(seed)
+    plates = {slot: 0.2 + 0.4 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
+
+    def plate_of(flash: TrueFlash) -> np.ndarray:
+        lit = plates.get(flash.slot, np.zeros((ROWS, COLUMNS)))
+        return np.asarray(lit * (1 + 0.06 * rng.standard_normal()), np.float32)
+
+    shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
+    profiles: np.ndarray = shot.frames.mean(axis=2, dtype=np.float64)
+    return profiles
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_lamps_that_flicker_are_not_taken_for_a_camera_whose_gain_changes(
+    plan: Plan, seed: int, *, backwards: bool
+) -> None:
+    """Under 6 % of flicker a clip was said to have been filmed with automatic exposure."""
+    profiles = swinging(plan, seed)
+    timing = timing_of(plan, profiles[::-1] if backwards else profiles)
+    assert not any("gain by itself" in note for note in timing.notes)
+    assert timing.swing is not None
+    assert timing.swing.cause == "lamps"
+    assert 0.1 < timing.swing.share < 0.4
+
+
+@pytest.mark.parametrize("period", [7.0, 3.0])
+def test_a_camera_whose_gain_swings_is_not_taken_for_lamps_that_flicker(plan: Plan, period: float) -> None:
+    timing = timing_of(plan, filmed(plan, gain=1 + 0.15 * np.sin(np.arange(FRAMES) / period)))
+    assert timing.swing is not None
+    assert timing.swing.cause == "camera"
+    assert timing.swing.share == pytest.approx(0.35, abs=0.08)
+    assert timing.swing.sentence in timing.notes
 
 
 @pytest.mark.parametrize("room", [0.05, 0.1])

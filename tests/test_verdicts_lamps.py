@@ -18,11 +18,15 @@ from judged_footage import (
     plan_of,
     rig_but_leaning,
     rig_of,
+    timing_of,
     validity,
 )
 
+from psvideo.model.swing import Swing
 from psvideo.report.judge import result
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
+from psvideo.report.judge.of_lamps import lamps as judge_lamps
+from psvideo.report.judge.of_timing import timing_and_order
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import verdict_of
@@ -157,14 +161,49 @@ def test_lamps_are_not_said_to_fire_where_nothing_is_lit() -> None:
 
 @pytest.mark.parametrize(("moving", "named"), [(0.0, ["a", "b"]), (0.3, []), (None, [])])
 def test_lamps_flicker_only_where_it_is_known_that_nothing_moves(moving: float | None, named: list[str]) -> None:
-    levels = 0.3 * (1 + 0.1 * np.sin(1.9 * np.arange(10)))
+    levels = 0.3 * (1 + 0.1 * np.sin(np.outer(np.arange(10), [1.9, 1.3])))
     facts = [
-        facts_of(levels=(level, level), clipped=(0.0,) * 2, white=(1.0,) * 2, moving_share=moving) for level in levels
+        facts_of(levels=tuple(level), clipped=(0.0,) * 2, white=(1.0,) * 2, moving_share=moving)
+        for level in levels.tolist()
     ]
     said = [
         line.found for line in lamps(Observed(lights=("a", "b"), facts=KeptFacts(facts))) if "flickers" in line.found
     ]
     assert [line.split("'")[1] for line in said] == named
+
+
+@pytest.mark.parametrize("lights", [2, 3, 6])
+def test_of_lights_that_all_change_together_the_camera_is_named_first(lights: int) -> None:
+    """Each lamp was said to flicker, and its driver and supply were to be checked, under automatic exposure."""
+    gains = 1 + 0.1 * np.sin(1.9 * np.arange(8))[:, None]
+    own = 1 + 0.01 * np.random.default_rng(1).standard_normal((8, lights))
+    one = Observed(lights=tuple("abcdef"[:lights]), facts=steady_but(0.3 * gains * own))
+    (camera, all_fire) = lamps(one)
+    assert (camera.subject, camera.grade, all_fire.grade) == ("gain", "doubtful", "good")
+    assert camera.found.index("the camera") < camera.found.index("supply")
+
+
+def steady_but(levels: np.ndarray) -> KeptFacts:
+    """Return rounds in which nothing moves, of lights with levels (round, light)."""
+    count = levels.shape[1]
+    return KeptFacts(
+        facts_of(levels=tuple(level), clipped=(0.0,) * count, white=(1.0,) * count, moving_share=0.0)
+        for level in levels.tolist()
+    )
+
+
+def test_no_lamp_is_blamed_for_what_whole_frames_do() -> None:
+    """As the frames' rows showed, which are known in time where plates are not."""
+    levels = 0.3 * (1 + 0.1 * np.sin(np.outer(np.arange(10), [1.9, 1.3, 1.0])))
+    one = Observed(lights=("a", "b", "c"), facts=steady_but(levels))
+    camera = Swing(share=0.26, cause="camera")
+    said = list(judge_lamps(one, swing=camera))
+    assert [(line.subject, line.grade) for line in said] == [("gain", "doubtful"), ("lights", "good")]
+    assert all("flickers" in line.found for line in judge_lamps(one, swing=replace(camera, cause="lamps")))
+    (untimed,) = judge_lamps(one, timed=False, swing=replace(camera, cause="lamps"))
+    assert (untimed.subject, untimed.grade) == ("lights", "doubtful")
+    timing = timing_of(phase_error_rows=1.0, swing=camera)
+    assert "exposure and gain first" in next(timing_and_order(timing, "rolling")).advice
 
 
 def test_one_light_is_not_compared_with_itself() -> None:

@@ -12,6 +12,7 @@ from psvideo.model.camera import Camera
 from psvideo.model.plan import HasLights, Plan
 from psvideo.model.rows.ripple import Ripple
 from psvideo.model.rows.shutter import Pulse
+from psvideo.model.swing import Swing
 from psvideo.model.units import show_seconds
 
 Order = Literal["marker", "rig", "given", "guess"]
@@ -66,8 +67,11 @@ class Timing:
         The LEDs' 1/e times, given or found.
     mains
         How ambient light swings with the mains, None where the clip does not show it clearly.
+    swing
+        How the clip's light grows and shrinks, None where it does not or that was not looked at. Not in the file, like
+        what follows.
     notes
-        Sentences on what to distrust. Not in the file, like the next two.
+        Sentences on what to distrust.
     row_time_error_s
         The row time's standard error where the picture gave it, None where the plan did.
     phase_error_s
@@ -88,6 +92,7 @@ class Timing:
     rise_s: float = 0.0
     fall_s: float = 0.0
     mains: Ripple | None = None
+    swing: Swing | None = field(default=None, compare=False)
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
     phase_error_s: float | None = field(default=None, compare=False)

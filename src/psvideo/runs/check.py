@@ -146,7 +146,7 @@ def judged_take(
             timing = _with_later_holes(timing, clip)
             later = tuple(number for number in later if number > take.numbers[-1])
             lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
-            notes = timing.notes
+            notes = tuple(note for note in timing.notes if timing.swing is None or note != timing.swing.sentence)
     return Check(
         clip=clip.name,
         path=path,

@@ -15,6 +15,7 @@ from psvideo.sync.named_strobe import FoundStrobe
 from psvideo.sync.unfired import only_fired, remarks_on_unfired
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
+from psvideo.sync.verdict.swinging import swing_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,14 +58,15 @@ def timing_of_take(take: FramesTaken, strobe: FoundStrobe, *, breaks: tuple[bool
     )
     marks = marks_of(plan, found, timing.flashes, take.indices, breaks)
     black, seen, unfired, fired = marks.black, marks.seen, marks.unfired, marks.fired
+    swing = swing_of(plan, only_fired(found, seen, unfired))
     notes = (
-        *remarks(plan, found, steady=only_fired(found, seen, unfired)),
+        *remarks(plan, found, swing=swing),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
         *remarks_on_frames(plan, found, take.indices),
         *remarks_on_black(found, black, take.numbers),
         *remarks_on_unfired(found, seen, fired, take.numbers),
     )
-    return replace(timing, flashes=fired, notes=notes)
+    return replace(timing, flashes=fired, swing=swing, notes=notes)
 
 
 def _all_dropped(

@@ -80,6 +80,7 @@ def joined(
         phase_error_s=max(one.phase_error_s or 0.0 for one in timings),
         mains=main.mains if main is timings[0] else None,
         dropped_frames=tuple(holes[after] for after in sorted(holes)),
+        swing=max((one.swing for one in timings if one.swing), key=lambda swing: swing.share, default=None),
         repeated_frames=tuple(number for one in timings for number in one.repeated_frames),
         notes=(
             *_restarts(chapters),

@@ -43,7 +43,12 @@ def judgements(
         *on_time,
         *coverage(plan, timing, observed, take_s=take_s),
         *exposed,
-        *lamps(observed, timed=all(one.grade == "good" for one in on_time), missed=in_step(plan, timing)),
+        *lamps(
+            observed,
+            timed=all(one.grade == "good" for one in on_time),
+            missed=in_step(plan, timing),
+            swing=timing.swing,
+        ),
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),

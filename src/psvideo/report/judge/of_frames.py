@@ -56,7 +56,9 @@ def later_frames(early: Sequence[FrameLight], late: Sequence[FrameLight]) -> Jud
     first, then = (max(1e-6, *(frame.top for frame in frames)) for frames in (early, late))
     ratio = then / first
     if DARKER < ratio < BRIGHTER:
-        return Judgement(subject="later", grade="good", found="Light and exposure stay through the take.")
+        return Judgement(
+            subject="later", grade="good", found="Later in the take the picture is as bright as at its start."
+        )
     change = abs(np.log2(max(ratio, 1e-6)))
     word = "brighter" if ratio > 1 else "darker"
     return Judgement(

@@ -5,8 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Doubles, Flags
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.rig import LEAST_LIGHTS
+from psvideo.model.swing import Swing
 from psvideo.model.units import listed
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
@@ -20,13 +22,19 @@ CHECKED_FROM = 5
 MISSED = 0.5
 """A flash that gives less than this share of its lamp's usual light did not fire as it should."""
 UNSTEADY = 0.02
+ALIKE = 0.6
+"""Lamps whose light changes together have this correlation from round to round; two that flicker have it by chance in
+one of eight takes of five rounds, three in one of thirty, four in one of a hundred."""
 NAMED = 4
 """This many lights or rounds are named one by one; of more, only how many."""
 
 
-def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> Iterator[Judgement]:
+def lamps(
+    observed: Observed, *, timed: bool = True, missed: bool = False, swing: Swing | None = None
+) -> Iterator[Judgement]:
     """Judge whether every lamp gives light, always, and steadily; where flash times are not known (``timed``), only
-    whether it does at all. ``missed``: the camera may be blind whenever one lamp flashes."""
+    whether it does at all. ``missed``: the camera may be blind whenever one lamp flashes. ``swing`` is how the clip's
+    light grows and shrinks: no lamp is blamed for what whole frames do."""
     facts = _known(observed)
     if not facts:
         return
@@ -41,9 +49,14 @@ def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> It
     if timed and whole.any():
         shown = [one for one in facts if one.unseen_share == 0]
         said += _missed(observed.lights, shown, level[whole], usual, alive)
-        said += _unsteady(observed.lights, shown, level[whole], usual, alive)
+        if swing is None or swing.cause == "lamps":
+            said += _unsteady(observed.lights, shown, level[whole], usual, alive)
+    if swing is not None and (swing.cause != "lamps" or not any(one.subject == "lights" for one in said)):
+        said.append(_swings(swing))
     yield from said
-    if not said and relative.max() > 0:  # else nothing is lit, which is said once
+    if (
+        not any(one.subject == "lights" for one in said) and relative.max() > 0
+    ):  # else nothing is lit, which is said once
         always = " in every round" if timed and whole.all() else ""
         yield Judgement(subject="lights", grade="good", found=_all_fire(relative[known], len(known), always))
 
@@ -231,12 +244,30 @@ def _unsteady(
     steps = np.abs(np.diff(level, axis=0))[still]
     if len(steps) < 4:
         return
-    swing = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
-    for light, share, lives in zip(lights, swing, alive, strict=True):
-        if lives and share > UNSTEADY:
+    change = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
+    unsteady = alive & (change > UNSTEADY)
+    if unsteady.sum() > 1 and _together((level / np.maximum(usual, 1e-9))[:, unsteady], still):
+        yield _swings(Swing(share=float(change[unsteady].mean()), cause="either"))
+        return
+    for light, share, flickers in zip(lights, change, unsteady, strict=True):
+        if flickers:
             yield Judgement(
                 subject="lights",
                 grade="doubtful",
                 found=f"The light {light!r} flickers: its level changes by {100 * share:.1f} % from round to round.",
                 advice="Check its driver and supply, and that no dimmer (PWM) is in its line.",
             )
+
+
+def _together(level: Doubles, still: Flags) -> bool:
+    """Return whether lamps change together, as under another gain of the camera, and not each for itself: ``level``
+    (round, light) is what each gives of its usual light, ``still`` (round - 1,) between which rounds nothing moves."""
+    steps = np.diff(level, axis=0)[still]
+    each, mean = (steps**2).mean(), (steps.mean(axis=1) ** 2).mean()
+    apart = 1 / level.shape[1]
+    return bool(mean > (apart + (1 - apart) * ALIKE) * each)
+
+
+def _swings(swing: Swing) -> Judgement:
+    subject = "lights" if swing.cause == "lamps" else "gain"
+    return Judgement(subject=subject, grade="doubtful", found=swing.found, advice=swing.advice)

@@ -8,6 +8,12 @@ from psvideo.report.judgement import Judgement
 SURE_ROWS, LOST_ROWS = 0.3, 2.0
 """Standard errors of the flashes' times beyond which a take is doubtful, and bad."""
 
+CHECK_PLAN = (
+    "Check that plan.toml is what the strobe played, and its transfer how the files code light: a wrong curve looks "
+    "like another exposure. Fix the exposure, and switch stabilisation off."
+)
+GAIN_FIRST = "Fix the camera's exposure and gain first (see the line on gain): that frames change costs most of this."
+
 
 def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
     """Judge how certain the flashes' times and names are."""
@@ -29,8 +35,7 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
             found=f"Flash times are known to {rows:.2f} row only: plates may be torn near the dark row."
             if timing.row_time_s
             else f"{timing.how_sure} Frames that hold two flashes may be taken for one.",
-            advice="Check that plan.toml is what the strobe played, and its transfer how the files code light: a wrong "
-            "curve looks like another exposure. Fix the exposure, and switch stabilisation off.",
+            advice=GAIN_FIRST if timing.swing is not None and timing.swing.cause == "camera" else CHECK_PLAN,
         )
     if timing.order == "guess":
         yield Judgement(

@@ -1,5 +1,6 @@
 """Whether a fit can be believed, and what to say about it.
 
 ``believed`` decides, with ``rivals`` (other plans that may have been meant) and ``elsewhere`` (other times of the same
-plan); ``refusal`` says why nothing was found, ``remarks`` and ``frame_remarks`` what to distrust in what was.
+plan); ``refusal`` says why nothing was found, ``remarks`` and ``frame_remarks`` what to distrust in what was, and
+``swinging`` whose doing it is that light grows and shrinks.
 """

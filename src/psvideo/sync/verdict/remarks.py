@@ -6,16 +6,16 @@ from itertools import combinations
 
 import numpy as np
 
-from psvideo.model.arrays import Doubles
 from psvideo.model.camera import Camera
 from psvideo.model.cost.in_step import IN_STEP, never_shown
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS
+from psvideo.model.swing import Swing
 from psvideo.model.units import NTSC, show_seconds
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import brightnesses, predictions
+from psvideo.sync.rowfit.profiles import brightnesses
 
 OF_MISNAMED_PPM = (1e6 * (float(NTSC) - 1.0), 1e6 * (1.0 / float(NTSC) - 1.0))
 """Clock offsets that a frame rate misnamed by 1.001 leaves: -999 ppm for a plan of 120 and footage of 119.88, +1000 ppm
@@ -25,15 +25,6 @@ CHANGED, GROSS = 1e-3, 0.08
 """Shares by which an exposure or a readout must be off to be worth a word, and to make the plan's value a mistake."""
 SURE = 5.0
 """Standard errors by which it must also be off to be called a mistake."""
-GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
-"""Exposure is called automatic where frames' gains differ by this much and explain this share of what is left."""
-GAIN_FRAMES = (9, 1)
-"""Frames over which a gain is taken to be the same: exposures creep, and some jump."""
-DIM = 0.05
-"""Frames with less than this share of the usual light show no gain."""
-TIED, TINY = 1e-3, 1e-30
-"""The gains of flashes and of the room are alike by this much where frames do not tell them apart; and what keeps the
-gains of black frames finite."""
 MIXED_ROWS = 0.02
 """Share of the rows that may hold two flashes before it is worth a word."""
 UNFIRED = 0.01
@@ -46,17 +37,15 @@ MUCH = 0.5
 """Share of the times' error from which on its source is worth a word."""
 
 
-def remarks(plan: Plan, found: ClipFit, *, steady: ClipFit) -> tuple[str, ...]:
-    """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given.
-
-    ``steady`` is the fit with those frames only whose flashes all fired.
-    """
+def remarks(plan: Plan, found: ClipFit, *, swing: Swing | None) -> tuple[str, ...]:
+    """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given;
+    ``swing`` is how its light grows and shrinks."""
     beat = found.fit.beat
     said = [
         _clock(plan, found),
         _mixed(plan, beat),
         *_camera(plan, found),
-        _exposure(plan, steady),
+        "" if swing is None else swing.sentence,
         _soft(found),
         _unsteady(found),
         _sureness(plan, found),
@@ -160,53 +149,6 @@ def _direction(readout_s: float) -> str:
     if readout_s == 0:
         return "all rows at once"
     return f"{'bottom' if readout_s < 0 else 'top'} row first"
-
-
-def _exposure(plan: Plan, found: ClipFit) -> str:
-    for frames_each in GAIN_FRAMES:
-        gains, share = frame_gains(plan, found, frames_each=frames_each)
-        least = min(_range(one) for one in gains)
-        if share > GAIN_EXPLAINS and least > GAIN_RANGE:
-            return (
-                f"Whole frames grow brighter and darker by {100 * _range(gains[0]):.0f} %: the camera seems to have "
-                "set its exposure or gain by itself. Plates of different moments cannot be compared; film with "
-                "everything fixed."
-            )
-    return ""
-
-
-def _range(gain: Doubles) -> float:
-    """Return by which share the larger gains exceed the smaller ones; 0 where some are none."""
-    low, high = np.percentile(gain, [2, 98])
-    return float(high / low - 1) if low > 0 else 0.0
-
-
-def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[tuple[Doubles, Doubles], float]:
-    """Return every frame's gain (frame,) against the whole clip's brightnesses, and of its flashes alone; and what the
-    first explains of the rest. The light of the room may change where the camera's gain and the flashes do not."""
-    rows = replace(found.rows, doubt=None)
-    beat = replace(found.fit.beat, beat_hz=())
-    light = brightnesses(plan, rows.one_window(), beat)
-    expected = predictions(plan, rows, beat, light)
-    trust = found.fit.weight / found.fit.weight.max(axis=0)
-    change = rows.value - expected
-    room = np.broadcast_to(light[:, 0], expected.shape)
-
-    def around(one: Doubles, other: Doubles) -> Doubles:
-        sums, width = (trust * one * other).sum(axis=1), min(frames_each, len(rows.value))
-        return np.convolve(np.pad(sums, width // 2, mode="edge"), np.ones(width), mode="valid")[: len(sums)]
-
-    power = around(expected, expected)
-    lit = power > DIM * np.median(power)
-    gain = 1 + np.where(lit, around(expected, change) / np.maximum(power, TINY), 0.0)
-    parts = (expected - room, room)
-    hessian = np.moveaxis(np.array([[around(one, other) for one in parts] for other in parts]), -1, 0)
-    tied = TIED * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    scores = np.stack([around(one, change) for one in parts], axis=-1)
-    alone = np.linalg.solve(hessian + tied + TINY * np.eye(2), scores[..., None])[:, 0, 0]
-    before = float((trust * change**2).sum())
-    after = float((trust * (rows.value - gain[:, None] * expected) ** 2).sum())
-    return (gain, 1 + np.where(lit, alone, 0.0)), 1 - after / max(before, TINY)
 
 
 def _soft(found: ClipFit) -> str:

@@ -1,0 +1,145 @@
+"""Whether light grows and shrinks in a clip, and whether whole frames do, as under a camera's automatic exposure, or
+flashes, as of lamps whose supply swings.
+
+A frame of a rolling shutter mostly sees two flashes, and a flash is mostly seen by two frames. So both are told apart:
+under a gain for each frame, or for each flash, the right one leaves less over.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.model.arrays import Doubles, Integers
+from psvideo.model.plan import Plan
+from psvideo.model.swing import Cause, Swing
+from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, predictions
+from psvideo.sync.rowfit.row_model import Flashes
+from psvideo.sync.rowfit.tracking.misfires import SeenFlashes, frames_seeing, seen_flashes
+
+GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
+"""Light is said to swing where gains differ by this much and explain this share of what is left."""
+GAIN_FRAMES = (9, 1)
+"""Frames over which a gain is taken to be the same: exposures creep, and some jump."""
+DIM = 0.05
+"""Frames and flashes with less than this share of the usual light show no gain."""
+TIED, TINY = 1e-3, 1e-30
+"""The gains of flashes and of the room are alike by this much where frames do not tell them apart; and what keeps the
+gains of black frames finite."""
+CLEARLY = 1.1
+"""By this factor more must be left over under the other cause, in squares, for one to be named alone."""
+TURNS = 4
+"""Flashes whose tails or rows overlap share what is left; so often it is dealt out again."""
+TOGETHER = 512
+"""Flashes that are looked at together: long takes have 200,000, and each is seen by three pictures of rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """What a clip shows, and what a fit without gains expects: ``value``, ``expected`` and ``trust``, (frame, row),
+    and every row's brightnesses, ``light`` (row, unknown)."""
+
+    plan: Plan
+    rows: Profiles
+    found: ClipFit
+    light: Doubles
+    expected: Doubles
+    trust: Doubles
+
+    @property
+    def change(self) -> Doubles:
+        """What is left over of the profiles, (frame, row)."""
+        return self.rows.value - self.expected
+
+
+def swing_of(plan: Plan, found: ClipFit) -> Swing | None:
+    """Return how a clip's light grows and shrinks, None where it does not. ``found`` holds those frames only whose
+    flashes all fired."""
+    seen = _seen(plan, found)
+    before = float((seen.trust * seen.change**2).sum())
+    for frames_each in GAIN_FRAMES:
+        gains, rest_of_frames = _frame_gains(seen, frames_each=frames_each)
+        if 1 - rest_of_frames / max(before, TINY) > GAIN_EXPLAINS and min(map(_range, gains)) > GAIN_RANGE:
+            flashes, rest = _flash_gains(seen)
+            (each, _), rest_of_frames = _frame_gains(seen, frames_each=1)
+            cause = _cause(rest_of_frames, rest)
+            return Swing(share=_range(flashes if cause == "lamps" else each), cause=cause)
+    return None
+
+
+def _cause(under_frames: float, under_flashes: float) -> Cause:
+    """Return whose doing a swing is, by what is left over under gains of frames and of flashes."""
+    if under_flashes > CLEARLY * under_frames:
+        return "camera"
+    return "lamps" if under_frames > CLEARLY * under_flashes else "either"
+
+
+def _seen(plan: Plan, found: ClipFit) -> _Seen:
+    rows = replace(found.rows, doubt=None)
+    found = replace(found, fit=replace(found.fit, beat=replace(found.fit.beat, beat_hz=())))
+    light = brightnesses(plan, rows.one_window(), found.fit.beat)
+    return _Seen(
+        plan=plan,
+        rows=rows,
+        found=found,
+        light=light,
+        expected=predictions(plan, rows, found.fit.beat, light),
+        trust=found.fit.weight / found.fit.weight.max(axis=0),
+    )
+
+
+def _range(gain: Doubles) -> float:
+    """Return by which share the larger gains exceed the smaller ones; 0 where some are none."""
+    low, high = np.percentile(gain, [2, 98]) if len(gain) else (0.0, 0.0)
+    return float(high / low - 1) if low > 0 else 0.0
+
+
+def _frame_gains(seen: _Seen, *, frames_each: int) -> tuple[tuple[Doubles, Doubles], float]:
+    """Return every frame's gain (frame,) against the whole clip's brightnesses, and of its flashes alone; and the
+    square that the first leaves over. The light of the room may change where the camera's gain and the flashes do not.
+    """
+    rows, expected, change, trust = seen.rows, seen.expected, seen.change, seen.trust
+    room = np.broadcast_to(seen.light[:, 0], expected.shape)
+
+    def around(one: Doubles, other: Doubles) -> Doubles:
+        sums, width = (trust * one * other).sum(axis=1), min(frames_each, len(rows.value))
+        return np.convolve(np.pad(sums, width // 2, mode="edge"), np.ones(width), mode="valid")[: len(sums)]
+
+    power = around(expected, expected)
+    lit = power > DIM * np.median(power)
+    gain = 1 + np.where(lit, around(expected, change) / np.maximum(power, TINY), 0.0)
+    parts = (expected - room, room)
+    hessian = np.moveaxis(np.array([[around(one, other) for one in parts] for other in parts]), -1, 0)
+    tied = TIED * np.trace(hessian, axis1=1, axis2=2)[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    scores = np.stack([around(one, change) for one in parts], axis=-1)
+    alone = np.linalg.solve(hessian + tied + TINY * np.eye(2), scores[..., None])[:, 0, 0]
+    rest = float((trust * (rows.value - gain[:, None] * expected) ** 2).sum())
+    return (gain, 1 + np.where(lit, alone, 0.0)), rest
+
+
+def _flash_gains(seen: _Seen) -> tuple[Doubles, float]:
+    """Return the gains of those flashes of which enough was seen, against the whole clip's brightnesses, and the
+    square that gains of all flashes leave over."""
+    flashes, rest = compiled_flashes(seen.plan, seen.rows, seen.found.fit.beat), seen.change
+    lit = np.flatnonzero(flashes.unknown)
+    parts = np.array_split(lit, -(-len(lit) // TOGETHER)) if len(lit) else []
+    gain, power = np.ones(len(flashes.unknown)), np.zeros(len(flashes.unknown))
+    for _ in range(TURNS):
+        for some in parts:
+            at, own = _own_light(seen, flashes, some)
+            trust = seen.trust[at]
+            power[some] = (trust * own**2).sum(axis=(1, 2))
+            known = power[some] > DIM * np.median(power[some])
+            move = np.where(known, (trust * own * rest[at]).sum(axis=(1, 2)) / np.maximum(power[some], TINY), 0.0)
+            gain[some] += move
+            np.subtract.at(rest, at, move[:, None, None] * own)
+    enough = lit[power[lit] > DIM * np.median(power[lit])] if len(lit) else lit
+    return gain[enough], float((seen.trust * rest**2).sum())
+
+
+def _own_light(seen: _Seen, flashes: Flashes, some: Integers) -> SeenFlashes:
+    """Return the light of some flashes by their place in the train, as the frames that may see any of it do."""
+    rows, beat, duration_s = seen.rows, seen.found.fit.beat, flashes.duration_s[some]
+    touched = frames_seeing(rows, beat, duration_s)
+    at, share = seen_flashes(rows, beat, flashes.start_s[some], duration_s, touched=touched)
+    return SeenFlashes(at=at, share=share * seen.light.T[flashes.unknown[some]][:, None, :])
