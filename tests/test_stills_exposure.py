@@ -5,11 +5,30 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from still_pictures import LIGHTS, SIZE, ball, error_deg, listed, lit, photographs, remarks, save16, with_exposures
+from PIL import Image
+from still_pictures import (
+    LIGHTS,
+    NAMES,
+    SIZE,
+    as_srgb,
+    ball,
+    error_deg,
+    listed,
+    lit,
+    photographs,
+    remarks,
+    save8,
+    save16,
+    with_exposures,
+)
 
 import psvideo as ps
 from psvideo.clip.decode.decoders import decode
+from psvideo.clip.record import Header
+from psvideo.clip.stated import Stated, relative_exposures
+from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.model.quantities import Aov
+from psvideo.runs.photographs.still_doubts import _signals
 
 
 def test_a_dark_picture_is_taken_off_and_a_mask_is_used_where_they_are_named_so(tmp_path: Path) -> None:
@@ -57,6 +76,43 @@ def test_the_room_s_light_is_taken_off_as_much_as_each_picture_holds(seconds: tu
     assert ("the ambient light was scaled by it" in remarks(report)) == (len({*seconds[:6]}) == 1)
     assert any("does not say how it was exposed" in one for one in report.warnings) == (seconds[-1] == 0)
     assert error_deg(tmp_path / "out") < 1.5
+
+
+@pytest.mark.parametrize("tag", [0x829D, 0x8827], ids=["aperture", "ISO"])
+def test_exposures_by_other_tags_are_not_compared(tmp_path: Path, tag: int) -> None:
+    """One picture without FNumber among others at f/4 counted as taken at f/1, sixteen times as bright."""
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for name, picture in zip(NAMES, lit(), strict=True):
+        exif = Image.Exif()
+        exif.get_ifd(0x8769)[0x829A] = 0.02
+        if name != NAMES[2]:
+            exif.get_ifd(0x8769)[tag] = 4
+        save8(folder / f"{name}.jpg", as_srgb(picture), exif=exif, quality=98)
+    report = ps.stills(folder, lights=listed(tmp_path / "l.lp"), out=tmp_path / "out")
+    by = {0x829D: "aperture", 0x8827: "ISO"}[tag]
+    assert f"by time and {by}, others by time alone; none is scaled" in remarks(report)
+    assert not any("EXIF" in one for one in report.warnings)
+    assert error_deg(tmp_path / "out") < 1.5
+    assert not any("exposures differ" in one.text for one in photograph_findings(folder))
+
+
+def test_a_dark_picture_with_fewer_tags_than_the_lights_is_taken_for_a_usual_one() -> None:
+    lights = [Stated(exposure=time_s / 16, exposed_by=("time", "aperture")) for time_s in (0.02, 0.04, 0.02)]
+    relative = relative_exposures(lights, [Stated(exposure=0.02, exposed_by=("time",))])
+    assert relative is not None
+    np.testing.assert_allclose(relative, [1, 2, 1, 1])
+
+
+def test_codes_of_raw_files_count_from_their_black_to_their_white() -> None:
+    """Levels of 600 and 16000 of 16383 tilted what a curve was judged by."""
+    head = Header(width_px=4, height_px=4, channels=1, bits=14, black=((600.0, 500.0), (400.0, 300.0)), white=16000.0)
+    light = np.linspace(0.1, 0.9, 16).reshape(4, 4)
+    black = np.tile(np.array(head.black), (2, 2))
+    rows = cols = np.arange(4)
+    np.testing.assert_allclose(_signals(black + light * (16000 - black), head, rows, cols), light)
+    plain = Header(width_px=4, height_px=4, channels=3, bits=8)
+    np.testing.assert_allclose(_signals(np.full((4, 4, 3), 51.0), plain, rows, cols), 0.2)
 
 
 def test_a_dark_picture_whose_exposure_is_misstated_is_taken_off_as_it_is(tmp_path: Path) -> None:

@@ -34,13 +34,15 @@ class Stated:
     """What a file says; None where it does not.
 
     transfer: the curve's name, or "unknown" where its curve is none that psvideo knows. by: what says so.
-    exposure: light gathered, seconds times ISO over the f-number squared, on a scale of its own.
+    exposure: light gathered, seconds times ISO over the f-number squared, on a scale of its own, of those of the three
+    that it says, exposed_by: exposures by other ones cannot be compared.
     focal_widths: the focal length in widths of the picture's longer side, which is longer_px; focal_px: in pixels.
     """
 
     transfer: str | None = None
     by: str = ""
     exposure: float | None = None
+    exposed_by: tuple[str, ...] = ()
     focal_widths: float | None = None
     longer_px: int = 0
     camera: str = ""
@@ -69,7 +71,7 @@ def stated_by(path: Path) -> Stated:
             taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
         found = replace(
             found,
-            exposure=_exposure(taken),
+            **_exposure(taken),
             focal_widths=_above_0(taken.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
             camera=_camera(taken),
         )
@@ -78,13 +80,20 @@ def stated_by(path: Path) -> Stated:
 
 def relative_exposures(lights: Sequence[Stated], dark: Sequence[Stated] = ()) -> Doubles | None:
     """Return by how much more than the usual picture of a light each one was exposed, (picture,), those of the dark
-    last, 1 where they do not say; None where the lights' do not all say it, or all are alike."""
+    last, 1 where they do not say; None where the lights' do not all say it by the same tags, or all are alike."""
     known = np.array([one.exposure for one in lights if one.exposure is not None])
-    if not len(known) or len(known) < len(lights):
+    if not len(known) or len(known) < len(lights) or not all(says_as(one, lights[0]) for one in lights):
         return None
     usual = float(np.median(known))
-    relative = np.append(known, [one.exposure or usual for one in dark]) / usual
+    of_dark = [one.exposure if one.exposure is not None and says_as(one, lights[0]) else usual for one in dark]
+    relative = np.append(known, of_dark) / usual
     return relative if are_uneven(relative) else None
+
+
+def says_as(one: Stated, other: Stated) -> bool:
+    """Return whether two files say how they were exposed by the same tags, so that it can be compared: one without
+    FNumber would count as taken at f/1 beside one at f/4."""
+    return one.exposure is not None and one.exposed_by == other.exposed_by
 
 
 def are_uneven(exposures: Doubles) -> bool:
@@ -104,12 +113,17 @@ def _camera(taken: dict[int, Any]) -> str:
     return model if make and model.startswith(make.split()[0]) else f"{make} {model}".strip()
 
 
-def _exposure(taken: dict[int, Any]) -> float | None:
-    seconds = _above_0(taken.get(ExifTags.Base.ExposureTime))
-    stop = _above_0(taken.get(ExifTags.Base.FNumber)) or 1.0
+def _exposure(taken: dict[int, Any]) -> dict[str, Any]:
+    """Return ``exposure`` and ``exposed_by`` of a Stated by EXIF's tags."""
     iso = taken.get(ExifTags.Base.ISOSpeedRatings)
-    speed = _above_0(iso[0] if isinstance(iso, tuple) and iso else iso) or 1.0
-    return None if seconds is None else seconds * speed / stop**2
+    stop = _above_0(taken.get(ExifTags.Base.FNumber))
+    factors = {
+        "time": _above_0(taken.get(ExifTags.Base.ExposureTime)),
+        "aperture": None if stop is None else 1 / stop**2,
+        "ISO": _above_0(iso[0] if isinstance(iso, tuple) and iso else iso),
+    }
+    known = {name: factor for name, factor in factors.items() if factor is not None}
+    return {"exposure": float(np.prod(list(known.values()))), "exposed_by": tuple(known)} if "time" in known else {}
 
 
 def _coded_curve(path: Path) -> tuple[str, str] | None:

@@ -150,7 +150,7 @@ def _stated(kind: str, file: Path) -> Stated:
         return said
     from psvideo.clip.decode import raw  # loads LibRaw
 
-    return replace(said, exposure=raw.relative_exposure(file))
+    return replace(said, exposure=raw.relative_exposure(file), exposed_by=("time", "aperture", "ISO"))
 
 
 def _refuse_odd(files: Sequence[Path], facts: Sequence[str], verb: str) -> None:

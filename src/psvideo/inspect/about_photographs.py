@@ -6,6 +6,7 @@ from pathlib import Path
 
 from psvideo.calibrate.light_files import find_stills
 from psvideo.clip.reading import looks
+from psvideo.clip.stated import says_as
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import PLAN_FILE
@@ -44,7 +45,7 @@ def _as_taken(pictures: Photographs) -> Iterator[Finding]:
     said = [first.camera, f"a lens of {first.focal_px:.0f} pixels" if first.focal_px else ""]
     if any(said):
         yield ok(f"taken by {', with '.join(one for one in said if one)}, as EXIF says")
-    exposures = [one.exposure for one in pictures.stated if one.exposure is not None]
+    exposures = [one.exposure for one in pictures.stated if one.exposure is not None and says_as(one, first)]
     if exposures and max(exposures) > SAME_EXPOSURE * min(exposures):
         yield warn(f"exposures differ by up to a factor {max(exposures) / min(exposures):.3g}, as EXIF says")
 

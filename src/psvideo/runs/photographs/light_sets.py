@@ -25,7 +25,7 @@ from psvideo.calibrate.light_pictures import (
 from psvideo.calibrate.still_places import Place
 from psvideo.clip import Take
 from psvideo.clip.folder import MOVIES
-from psvideo.clip.stated import relative_exposures, stated_by
+from psvideo.clip.stated import relative_exposures, says_as, stated_by
 from psvideo.clip.transfer import find_curve
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
@@ -212,7 +212,7 @@ def _uneven(files: LightFiles) -> tuple[str, ...]:
         said.append("strengths that are measured are those of these exposures, not of the lights alone")
     if times:
         said.append("the ambient light was scaled by it before it was taken off")
-        if stated_by(files.ambient_at(0)).exposure is None:
+        if not says_as(stated_by(files.ambient_at(0)), stated[0]):
             said.append(f"{files.ambient_at(0).name} does not say how it was exposed, and is taken for a usual one")
     return (f"{files.folder}: by their EXIF the pictures were exposed differently: {'; '.join(said)}",) if said else ()
 

@@ -14,10 +14,11 @@ from psvideo.clip.decode.decoders import opened, read_header
 from psvideo.clip.folder import KINDS
 from psvideo.clip.in_file import RowsInFile
 from psvideo.clip.reading import looks
-from psvideo.clip.stated import are_uneven, relative_exposures
+from psvideo.clip.record import Header
+from psvideo.clip.stated import Stated, are_uneven, relative_exposures, says_as
 from psvideo.clip.stills import Photographs
 from psvideo.clip.transfer import find_curve, to_light
-from psvideo.model.arrays import Doubles
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.rig import Light
 
 POINTS = 6000
@@ -136,8 +137,20 @@ def _thin(pictures: Photographs, file: Path) -> Doubles:
     step = max(int(np.sqrt(codes.shape[0] * codes.shape[1] / POINTS)), 1)
     rows = np.arange(step // 2, codes.shape[0], step)
     some = codes.some(rows)[rows - rows[0]] if isinstance(codes, RowsInFile) else codes[rows]
-    thin = some[:, step // 2 :: step].astype(np.float64) / (2 ** (pictures.header.bits or 0) - 1)
+    cols = np.arange(step // 2, codes.shape[1], step)
+    thin = _signals(some[:, cols].astype(np.float64), pictures.header, rows, cols)
     return np.asarray((thin if thin.ndim == 2 else thin[..., 1]).ravel(), np.float64)
+
+
+def _signals(codes: Doubles, head: Header, rows: Integers, cols: Integers) -> Doubles:
+    """Return which signals the codes of some rows and columns stand for: 0 is black and 1 white, as raw files say."""
+    largest = float(2 ** (head.bits or 0) - 1)
+    zero, one = 0.0 if head.black is None else np.array(head.black), head.white or largest
+    pattern = np.atleast_2d(zero)
+    black = pattern[np.ix_(rows % pattern.shape[0], cols % pattern.shape[1])]
+    black = black if codes.ndim == 2 else black[..., None]
+    found: Doubles = np.clip((codes - black) / (one - black), 0.0, 1.0)
+    return found
 
 
 def dark_doubt(glance: Glance | None, pictures: Photographs, aside: Sequence[Path]) -> str | None:
@@ -179,28 +192,33 @@ def curve_doubt(glance: Glance | None, pictures: Photographs) -> str | None:
     )
 
 
+def _not_all_say(lights: Sequence[Stated]) -> str | None:
+    """Say that only some pictures say how they were exposed, or not all of them by the same tags of EXIF."""
+    known = [one for one in lights if one.exposure is not None]
+    if known and len(known) < len(lights):
+        return f"Only {len(known)} of {len(lights)} pictures say how they were exposed; none is scaled."
+    tags = sorted({one.exposed_by for one in known}, key=len)
+    if len(tags) < 2:
+        return None
+    few, many = (" and ".join(one) for one in (tags[0], tags[-1]))
+    return f"Some pictures say how they were exposed by {many}, others by {few} alone; none is scaled."
+
+
 def exposures_of(
     glance: Glance | None, pictures: Photographs, count: int
 ) -> tuple[Doubles | None, str | None, str | None]:
     """Return by how much more each picture, the dark one last, was exposed than the usual one of ``count`` lights; None
     where all are alike or their files cannot be believed. With what to note, and what to warn of."""
-    named = [one.exposure for one in pictures.stated]
-    known = sum(one is not None for one in named[:count])
     relative = relative_exposures(pictures.stated[:count], pictures.stated[count:])
     if relative is None:
-        some = 0 < known < count
-        return (
-            None,
-            f"Only {known} of {count} pictures say how they were exposed; none is scaled." if some else None,
-            None,
-        )
+        return None, _not_all_say(pictures.stated[:count]), None
     lights = relative[:count]
     odd = pictures.files[int(np.argmax(np.abs(np.log(relative))))].name
     times = float(np.exp(np.abs(np.log(relative)).max()))
     said = f"By their EXIF the pictures were exposed differently ({odd} by a factor {times:.2g} from the usual)"
     scaled = "their lights' strengths were" if are_uneven(lights) else "the ambient light was"
     silent = None
-    if None in named:
+    if not all(says_as(one, pictures.stated[0]) for one in pictures.stated[count:]):
         silent = (
             f"{pictures.files[count].name} does not say how it was exposed, and the other pictures differ. Its light "
             "is taken off as of one exposed as most are. Give it as the camera wrote it."
