@@ -16,6 +16,7 @@ import pytest
 import psvideo
 from psvideo.cli import app
 from psvideo.cli.ending import ENDING, paragraph_on, stoppable
+from psvideo.formats.whole_folders import whole_folder
 
 ENDS_S = 2.9
 """The end of a process waits for threads for 3 s."""
@@ -163,3 +164,26 @@ def test_a_command_that_is_over_waits_for_no_thread_that_goes_on_beside_it() -> 
     done = subprocess.run([sys.executable, "-c", script], timeout=60, check=False, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (3, "said")
     assert time.monotonic() - began_s < ENDS_S, "at the interpreter's own end it is waited for longer"
+
+
+def test_a_stop_says_that_something_is_kept_only_where_something_was_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A run that was stopped while flashes were searched for said that what was finished is kept."""
+
+    def stopped_after(*written: str) -> str:
+        def run(_: object) -> int:
+            with whole_folder(tmp_path / "out", mark="report.json", settings="these") as folder:
+                for name in written:
+                    (folder / name).write_bytes(b"x")
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(app, "_run", run)
+        assert app.main([]) == 1
+        return capsys.readouterr().err
+
+    assert stopped_after() == "psvideo: stopped.\n"
+    assert stopped_after(".normals.1001.exr.partial-12") == "psvideo: stopped.\n"
+    assert stopped_after("normals.1001.exr") == (
+        "psvideo: stopped. What was finished is kept; the same command with --resume goes on.\n"
+    )

@@ -22,6 +22,7 @@ from judged_footage import (
     validity,
 )
 
+from psvideo.model.camera import Encoding
 from psvideo.model.swing import Swing
 from psvideo.report.judge import result
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
@@ -30,6 +31,7 @@ from psvideo.report.judge.of_timing import timing_and_order
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import verdict_of
+from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import count_levels
@@ -238,6 +240,25 @@ def test_no_power_is_advised_as_nothing(planned: float, said: str) -> None:
     plan = plan_of(("a",))
     flashes = tuple(replace(flash, lights={"a": planned}) for flash in plan.flashes)
     assert said in power_words(replace(plan, flashes=flashes), one)["a"]
+
+
+@pytest.mark.parametrize(
+    ("read", "said"),
+    [(1e-8, ["enough", "enough"]), (6e-6, ["is right", "aperture by 2.0 stops"]), (1e-4, ["2.0 stops", "4.0 stops"])],
+)
+def test_powers_of_log_footage_are_judged_by_noise_and_not_by_the_largest_code(read: float, said: list[str]) -> None:
+    """The largest code of S-Log3 lies five stops above its white: 'open the aperture by 6.0 stops' would have clipped
+    any sensor."""
+    one = Observed(lights=("a", "b"), noises=[AgainstNoise(level=0.0725, read=read, photon=0.0)])
+    for name, level in (("a", 0.0725), ("b", 0.0725 / 4)):
+        one.counts[name] = count_levels(np.full(1000, level, np.float32), 1.0)
+    plan = plan_of(one.lights)
+    log = replace(plan, camera=replace(plan.camera, encoding=Encoding(transfer="slog3")))
+    words = power_words(log, one)
+    assert [part in words[name] for name, part in zip("ab", said, strict=True)] == [True, True], words
+    known = replace(log, camera=replace(log.camera, encoding=Encoding(transfer="slog3", white_level=900)))
+    assert "3.5 stops" in power_words(known, one)["a"]
+    assert power_words(log, replace(one, noises=[])) == {}
 
 
 @pytest.mark.parametrize(("gain", "weak"), [(0.15, False), (0.1, True)])

@@ -28,8 +28,6 @@ from psvideo.errors import PsvideoError, UsageError, nearest
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
-RESUMED = ("split", "normals")
-"""The commands that go on where they were stopped."""
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:
@@ -88,8 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with stoppable():
             status = _run(arguments)
-    except KeyboardInterrupt:  # the command line library catches it only inside a command
-        status = _stopped(_words(arguments))
+    except KeyboardInterrupt as stop:  # the command line library catches it only inside a command
+        status = _stopped(stop)
     if arguments is None:  # this process is the command's own
         leave_threads(status)
     return status
@@ -124,15 +122,19 @@ def _ended(words: Sequence[str]) -> int:
         return fault.exit_status
     except SystemExit as end:
         if end.code == STOPPED:
-            return _stopped(words)
+            return _stopped(end)
         return end.code if isinstance(end.code, int) else 0
     return 0
 
 
-def _stopped(words: Sequence[str]) -> int:
-    goes_on = command_called(words) in RESUMED
-    kept = " What was finished is kept; the same command with --resume goes on." if goes_on else ""
-    print(f"psvideo: stopped.{kept}", file=sys.stderr)
+def _stopped(end: BaseException) -> int:
+    """Say that a command was stopped, and what the run that was stopped noted on it: what is kept."""
+    stop: BaseException | None = end
+    noted = list[str]()
+    while stop is not None:
+        noted += getattr(stop, "__notes__", [])
+        stop = stop.__cause__ or stop.__context__
+    print(spelled(" ".join(["psvideo: stopped.", *dict.fromkeys(noted)])), file=sys.stderr)
     return PsvideoError.exit_status
 
 

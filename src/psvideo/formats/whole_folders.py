@@ -27,6 +27,8 @@ UNFINISHED = ".*.partial*"
 endings add one."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
 """What systems say of a disk, or of somebody's share of it, that is full."""
+KEPT = "What was finished is kept; the same command with `resume` goes on."
+"""Noted on a stop (``BaseException.add_note``), for whoever ends the command."""
 
 
 @contextlib.contextmanager
@@ -53,7 +55,7 @@ def whole_folder(
                 shutil.rmtree(old, ignore_errors=True)
             if settings:
                 write_text(beside / SETTINGS, settings)
-            with _still_there(beside, path, settings):
+            with _still_there(beside, path, settings), _kept_noted(beside, resumable=bool(settings)):
                 yield beside
             _refuse_what_came(path, resumable=bool(settings))
             if mark != PLAN_FILE:  # footage is never replaced, and a full disk costs none of it
@@ -107,6 +109,21 @@ def _still_there(beside: Path, path: Path, settings: str) -> Iterator[None]:
             f"{path}: the folder {beside.name} in which it was written was removed meanwhile, with what had been "
             "finished. Nothing was left under that name: run the command again."
         )
+
+
+@contextlib.contextmanager
+def _kept_noted(beside: Path, *, resumable: bool) -> Iterator[None]:
+    """Note on a stop that what was finished is kept, where any file was and a run that is resumed goes on from it."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        if resumable and any(_is_finished(file) for file in beside.rglob("*")):
+            stop.add_note(KEPT)
+        raise
+
+
+def _is_finished(file: Path) -> bool:
+    return file.is_file() and file.name != SETTINGS and not file.match(UNFINISHED)
 
 
 @contextlib.contextmanager

@@ -1,10 +1,9 @@
 """All judgements of a take, line by line: what check says on the set, and the report after a run."""
 
-from psvideo.clip.transfer import records_scene
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import ambient
-from psvideo.report.judge.of_exposure import Ceiling, exposure
+from psvideo.report.judge.of_exposure import ceiling_of, exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
@@ -33,11 +32,7 @@ def judgements(
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
-    encoding = plan.camera.encoding
-    under: Ceiling = "saturation"
-    if records_scene(encoding.transfer):
-        under = "the sensor's saturation" if encoding.white_level is not None else "the largest code"
-    exposed = (saturation,) if saturation else tuple(exposure(observed, under=under))
+    exposed = (saturation,) if saturation else tuple(exposure(observed, under=ceiling_of(plan.camera.encoding)))
     lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt))
     return (
         *on_time,

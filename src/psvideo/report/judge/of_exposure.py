@@ -5,6 +5,8 @@ from typing import Literal
 
 import numpy as np
 
+from psvideo.clip.transfer import records_scene
+from psvideo.model.camera import Encoding
 from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED
@@ -39,6 +41,13 @@ MORE_LIGHT = (
 )
 
 FEWER_BITS = "Where files hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead."
+
+
+def ceiling_of(encoding: Encoding) -> Ceiling:
+    """Return what light is below in footage that is coded so."""
+    if not records_scene(encoding.transfer):
+        return "saturation"
+    return "the largest code" if encoding.white_level is None else "the sensor's saturation"
 
 
 def exposure(observed: Observed, *, under: Ceiling = "saturation") -> Iterator[Judgement]:
