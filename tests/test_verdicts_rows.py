@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from judged_footage import SIZE, Footage, even, facts_of, graded, looked_at, plan_of, ring, tiles, timing_of
 
+from psvideo.model.rows.recipe import LEAST_SHARE
 from psvideo.model.timing import DroppedFrames
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
@@ -52,6 +53,23 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
     assert covered("frames", dropped_frames=(DroppedFrames(after=3, count=1),)) == "doubtful"
     assert [moved(px) for px in (0, 1, 2, 4, 5)] == ["good", "good", "doubtful", "doubtful", "bad"]
     assert moved(5, aligned=True) == "doubtful"
+
+
+def test_check_and_the_whole_run_say_the_same_of_rows_that_come_from_other_rounds() -> None:
+    """The worst round of a part was 93 %, of the whole 51 %, and the shutter hides 45 %."""
+    plan = plan_of(["a"], mode="rolling", dark_s=0.01)
+    plan = replace(plan, flashes=tuple(replace(flash, duration_s=0.0007) for flash in plan.flashes))
+    said = []
+    for footage, take_s in ((Footage(borrowed=0.5), None), (Footage(borrowed=0.4, unseen=0.4), 60.0)):
+        lines = of_rows.coverage(plan, timing_of(exposure_s=0.005), footage.observed(0), take_s=take_s)
+        (line,) = (one for one in lines if one.subject == "rows")
+        said.append(line.found)
+    assert said[0] == said[1]
+    seen, places = 0, np.linspace(0, 0.01, 20001)[:-1]
+    for start_s in places:  # where in the frame of 10 ms, open for its first 5, a flash of 0.7 ms falls
+        open_s = max(min(start_s + 0.0007, 0.005) - start_s, 0) + max(start_s + 0.0007 - 0.01, 0)
+        seen += open_s >= LEAST_SHARE * 0.0007
+    assert f"about {100 * (1 - seen / len(places)):.0f} % of a round's rows" in said[0]
 
 
 def test_rows_whose_ambient_light_no_part_of_a_flash_tells_are_not_laid_to_the_shutter() -> None:

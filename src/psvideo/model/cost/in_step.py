@@ -50,6 +50,15 @@ def never_shown(plan: Plan, *, lasts_s: float | None = None, clock_offset_ppm: f
     return float(np.mean(shares))
 
 
+def blind_share(plan: Plan, *, clock_offset_ppm: float = 0.0) -> float:
+    """Return the share of the rows that do not see a flash of their own round, in the mean over lights and over where
+    in the frame flashes fall: they lie in the pause between two exposures. 0 at 360 degrees."""
+    period_s, rate = plan.camera.frame_period_s, 1 + clock_offset_ppm * 1e-6
+    pause_s = period_s - plan.camera.exposure_s
+    shown_s = [(1 - 2 * LEAST_SHARE) * flash.duration_s * rate for flash in plan.flashes if flash.lit]
+    return float(np.mean([max(pause_s - one_s, 0.0) / period_s for one_s in shown_s]))
+
+
 def stays_in_step(plan: Plan, never: float) -> bool:
     """Tell whether no more rows see a light in far longer takes than in a usual one, where ``never`` see none."""
     return never_shown(plan, lasts_s=LONG_CYCLES * plan.cycle_s) >= never - SAME_SHARE

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
+from psvideo.model.cost.in_step import IN_STEP, blind_share, dark_s_out_of_step, frames_in_step, never_shown
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
@@ -120,10 +120,12 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterat
             + ("." if other_s is None else f", or with a dark time (dark_s) of {other_s * 1e3:.4g} ms."),
         )
     elif borrowed > MOST_UNSEEN and unseen <= LOST_UNSEEN:
+        share = blind_share(_as_found(plan, timing), clock_offset_ppm=timing.clock_offset_ppm)
+        share = share if share > MOST_UNSEEN else borrowed
         yield Judgement(
             subject="rows",
             grade="doubtful",
-            found=f"{opened.capitalize()}: up to {100 * borrowed:.0f} % of a round's rows come from other rounds. What "
+            found=f"{opened.capitalize()}: about {100 * share:.0f} % of a round's rows come from other rounds. What "
             "stands still loses nothing by it, what moves in them is left out.",
             advice="Shoot at 360 degrees.",
         )
