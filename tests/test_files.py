@@ -186,7 +186,10 @@ BROKEN_RIGS = {
     ),
     "unknown key": ('name = "a"\ndirektion = [0.0, 0.0, 1.0]', "did you mean 'direction'?"),
     "a name that is taken": ('name = "ambient"\ndirection = [0.0, 0.0, 1.0]', "cannot be a light's name"),
-    "no strength": ('name = "a"\ndirection = [0.0, 0.0, 1.0]\nintensity = 0.0', "greater than 0"),
+    "no strength": (
+        'name = "a"\ndirection = [0.0, 0.0, 1.0]\nintensity = 0.0',
+        r"is 0.0: expected greater than 0 or a list (a light that stayed dark keeps the strength",
+    ),
     "strength in words": (
         'name = "a"\ndirection = [0.0, 0.0, 1.0]\nintensity = "full"',
         "key 'light[1].intensity' is 'full': expected a number or a list.",

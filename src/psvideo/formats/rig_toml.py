@@ -40,6 +40,16 @@ class _RigLight(Contract):
     def _name_can_name_files(cls, name: str) -> str:
         return check_light_name(name)
 
+    @field_validator("intensity", mode="before")
+    @classmethod
+    def _gives_light(cls, strength: object) -> object:
+        if isinstance(strength, int | float) and not isinstance(strength, bool) and strength <= 0:
+            raise ValueError(
+                "expected greater than 0 or a list (a light that stayed dark keeps the strength that it has when it "
+                "fires: pictures show that it was dark, and normals are solved without it)"
+            )
+        return strength
+
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
         if (self.direction is None) == (self.position_m is None):
