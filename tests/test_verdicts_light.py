@@ -34,7 +34,9 @@ from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judge.of_steps import COARSE_DEG, DEG_PER_STEP, coarse_steps
 from psvideo.report.observe.against_noise import AgainstNoise
+from psvideo.report.observe.code_steps import code_step
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.shadow import shadow_light
@@ -215,3 +217,41 @@ def test_a_clipped_take_is_not_told_to_give_more_light(clip: float) -> None:
     assert lacking.grade != "good"
     assert ("more light," in lacking.advice) == (clip < 0.02)
     assert (lacking.advice == result.CLIPPING_FIRST) == (clip > 0.02)
+
+
+def _quantised(step: int) -> tuple[list[np.ndarray], float]:
+    """Return a ball under three lights 38 degrees from the axis, in 8 bits of gamma 2.2 of which only every ``step``-th
+    code is used, and by how many degrees that turns the normals that all lights reach."""
+    rows, cols = (np.mgrid[:160, :160] - 79.5) / 78
+    depth = np.sqrt(np.maximum(1 - rows**2 - cols**2, 0))
+    normals = np.stack([cols, -rows, depth], axis=-1)
+    turn = np.radians([90, 210, 330])
+    lights = np.stack([0.616 * np.cos(turn), 0.616 * np.sin(turn), np.full(3, 0.788)], axis=1)
+    true = 0.48 * np.maximum(normals @ lights.T, 0) * (depth > 0)[..., None]
+    code = np.round(255 * true ** (1 / 2.2)) // step * step + (step - 1) / 2
+    seen = np.where(true > 0, (code / 255) ** 2.2, 0).astype(np.float32)
+    lit = (true > 0.02).all(axis=-1)
+    solved = seen[lit] @ np.linalg.inv(lights).T
+    cosine = (solved * normals[lit]).sum(axis=1) / np.linalg.norm(solved, axis=1)
+    return [seen[..., k] for k in range(3)], float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
+
+
+@pytest.mark.parametrize(("step", "said"), [(1, False), (8, True), (16, True)])
+def test_files_that_hold_few_levels_are_said_to_and_what_that_costs(step: int, said: bool) -> None:
+    """Normals of posterised footage were 2 and 4 degrees off, and the take was usable without a word."""
+    frames, off_deg = _quantised(step)
+    share = code_step(frames)
+    assert share is not None
+    found = coarse_steps(share)
+    assert (found is not None) == said == (off_deg > COARSE_DEG)
+    assert share * DEG_PER_STEP == pytest.approx(off_deg, rel=0.5, abs=0.3)
+
+
+def test_even_colours_and_fine_codes_are_not_taken_for_few_levels() -> None:
+    rng = np.random.default_rng(2)
+    colours = np.array([0.2, 0.22, 0.3, 0.34, 0.5, 0.52, 0.55, 0.7], np.float32)
+    patches = colours[rng.integers(0, 8, (20, 20))].repeat(8, axis=0).repeat(8, axis=1)
+    fine = (np.round(4095 * rng.uniform(0.2, 0.8, (160, 160))) / 4095).astype(np.float32)
+    assert code_step([patches]) is None
+    assert code_step([fine]) is None or coarse_steps(code_step([fine])) is None
+    assert code_step([np.zeros((40, 40), np.float32), np.full((40, 40, 3), np.nan, np.float32)]) is None

@@ -32,6 +32,7 @@ from psvideo.report.observe.observed import Observed
 from psvideo.runs.instants.reporting import observing
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
+from psvideo.runs.steps.levels import levels_of
 from psvideo.runs.steps.saturation import saturation_of
 from psvideo.solve.instants import surfaces
 from psvideo.solve.normals.solving import Solving
@@ -194,7 +195,9 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     numbers = take.clip.numbers
     partly = len(take.numbers) < len(numbers)
     take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s if partly else None
-    return (seen, *judgements(apart.plan, timing, observed, take_s=take_s, saturation=saturation_of(take)))
+    saturation, levels = saturation_of(take), levels_of(take)
+    judged = judgements(apart.plan, timing, observed, take_s=take_s, saturation=saturation, levels=levels)
+    return (seen, *judged)
 
 
 def _look_at_slopes(observed: Observed, one: Round, plan: Plan, rig: Rig) -> None:

@@ -25,10 +25,12 @@ def judgements(
     take_s: float | None = None,
     curve_doubt: str = "",
     saturation: Judgement | None = None,
+    levels: Judgement | None = None,
 ) -> tuple[Judgement, ...]:
     """Return one line per thing that decides whether a take can be used; ``take_s`` is how long a take lasts of which
     only a part was looked at, ``curve_doubt`` what pictures say against the curve by which they were read,
-    ``saturation`` that the sensor saturates where the plan does not say: nothing else is known of exposure then."""
+    ``saturation`` that the sensor saturates where the plan does not say: nothing else is known of exposure then;
+    ``levels`` that files hold too few levels."""
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
@@ -38,6 +40,7 @@ def judgements(
         *on_time,
         *coverage(plan, timing, observed, take_s=take_s),
         *exposed,
+        *([levels] if levels else []),
         *lamps(
             observed,
             timed=all(one.grade == "good" for one in on_time),

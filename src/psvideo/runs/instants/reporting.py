@@ -21,6 +21,7 @@ from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
 from psvideo.report.run_report import LightFacts, RunReport, report_record
+from psvideo.runs.steps.levels import levels_of
 from psvideo.runs.steps.lighting import Lighting
 from psvideo.runs.steps.output import Output
 from psvideo.runs.steps.saturation import saturation_of
@@ -83,9 +84,16 @@ def run_report(
         )
         for name in clip.plan.lights
     )
-    how = {} if solved is None else {"aligned": solved.aligned, "opened": solved.opened}
-    saturation = saturation_of(take)
-    judged = judgements(clip.plan, timing, observed, curve_doubt=clip.curve_doubt, saturation=saturation, **how)
+    judged = judgements(
+        clip.plan,
+        timing,
+        observed,
+        curve_doubt=clip.curve_doubt,
+        saturation=saturation_of(take),
+        levels=levels_of(take),
+        aligned=solved is not None and solved.aligned,
+        opened=solved is not None and solved.opened,
+    )
     warned = (one for one in clip.warnings if one != clip.curve_doubt)  # which is judged
     warnings = (*warned, *(() if solved is None else solved.warnings))
     spell = output.caller.spell

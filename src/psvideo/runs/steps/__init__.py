@@ -2,6 +2,7 @@
 
 All of them: ``caller`` (who hears of a run), ``output`` (where it writes), ``lighting`` (what it solves with).
 
-Single ones: ``checked`` (what a check found), ``saturation`` (clipping that no plan names), ``compiling`` with its
+Single ones: ``checked`` (what a check found), ``saturation`` (clipping that no plan names), ``levels`` (files that hold
+few), ``compiling`` with its
 ``small_pictures`` (loops compiled ahead of first use).
 """
