@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 from docs.figures.__main__ import FIGURES
-from docs.figures.commands import PAGE, commands_page
+from docs.figures.commands import PAGE, TASKS, commands_page
 from docs.figures.faults import FAULTS
 from docs.figures.python_page import run_blocks
 from docs.figures.staging import PICTURES
 from picture_file import read_picture
 
 import psvideo as ps
+from psvideo.cli.examples import EXAMPLES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted(
@@ -166,6 +167,7 @@ def test_the_newest_version_of_the_changelog_is_the_package_s() -> None:
 
 def test_the_page_of_commands_is_what_the_commands_say() -> None:
     assert PAGE.read_text(encoding="utf-8") == commands_page(), "stale: python -m docs.figures.commands"
+    assert set(TASKS) == {path for path in EXAMPLES if path and not any(one.startswith(f"{path} ") for one in EXAMPLES)}
 
 
 def test_every_picture_of_a_script_is_shown_small_and_has_words_for_those_who_cannot_see_it() -> None:

@@ -39,19 +39,60 @@ Besides commands and options it knows the lights of the plan that is named befor
 transfer curves, boards and ports.
 """
 
+TASK_HEAD = """## What to type for what
+
+| you want to | type |
+|---|---|"""
+TASKS = {
+    "capture-plan": "plan a shoot: frame rate, lights, flashes",
+    "strobe list": "find the light controller",
+    "strobe check": "know whether a board can play a plan",
+    "strobe run": "flash the lights for a take",
+    "strobe stop": "have all lights dark, now",
+    "strobe emulate": "try the controller without a board",
+    "calibrate mirror-sphere": "know where the lights are, from a chrome ball",
+    "calibrate matte-sphere": "the same from a matte ball, with their strengths",
+    "calibrate flat-field": "know how strong the lights are, from white paper",
+    "calibrate colours": "know what the camera sees of coloured LEDs",
+    "calibrate intensities": "correct strengths from the scene itself",
+    "calibrate guess": "begin without any calibration",
+    "calibrate convert": "hand lights on to another program, or read its list",
+    "calibrate readout": "measure how long the camera takes to read a frame",
+    "live": "see normals while the camera runs",
+    "check": "know on the set whether a take can be used",
+    "info": "know what a file or folder is, and whether it fits its plan",
+    "sync": "find when every flash fired",
+    "split": "get one picture sequence per light",
+    "normals": "get normals and albedo from a take",
+    "farm": "solve on a render farm",
+    "stills": "get normals and albedo from photographs, one per light",
+    "view": "look at a result, and relight it",
+    "doctor": "know whether all is installed, and how fast this machine is",
+    "demo": "see the whole chain without a camera",
+    "synth": "film a virtual scene of your own",
+}
+"""What a user wants, by command; the line to type is the command's first example."""
+
 
 def commands_page() -> str:
-    """Return the page: every command in the order of the work, with what it takes, defaults and examples."""
-    parts = [HEAD]
-    panel = ""
+    """Return the page: what to type for what, then every command in the order of the work, with what it takes, defaults
+    and examples."""
+    tasks, sections, panel = list[str](), list[str](), ""
     for entry in COMMANDS:
         if entry.panel != panel:
             panel = entry.panel
-            parts.append(f"## {panel.lstrip('0123456789 ')}\n")
+            tasks.append(f"| **{_title(panel)}** | |")
+            sections.append(f"## {_title(panel)}\n")
         group: Any = typer.main.get_command(application([entry.name]))
         for path, command in _below(entry.name, group.commands[entry.name]):
-            parts.append(_section(path, command))
-    return "\n".join(parts)
+            if path in TASKS:
+                tasks.append(f"| {TASKS[path]} | [`{_cell(EXAMPLES[path][0][1])}`](#{path.replace(' ', '-')}) |")
+            sections.append(_section(path, command))
+    return "\n".join([HEAD, TASK_HEAD, *tasks, "", *sections])
+
+
+def _title(panel: str) -> str:
+    return panel.lstrip("0123456789 ")
 
 
 def _below(path: str, command: Any) -> Iterator[tuple[str, Any]]:
