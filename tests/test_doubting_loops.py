@@ -8,14 +8,17 @@ import pytest
 from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
+from psvideo.solve.depth import View
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Usable
+from psvideo.solve.normals.loops.blocks import working_memory
+from psvideo.solve.normals.task import Usable, task
 from psvideo.solve.normals.trust import signs as of_signs
 from psvideo.solve.normals.trust import surroundings as of_around
 from psvideo.solve.normals.trust import thin_surface as thin
 from psvideo.solve.normals.trust import torn as of_torn
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
+from psvideo.solve.normals.trust.indirect_kernel import FACING, MOST_INDIRECT, SHADOWED, indirect_rows
 from psvideo.solve.normals.trust.judging_kernel import add_rows
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
@@ -208,3 +211,44 @@ def test_what_is_known_at_points_changes_steadily_between_them(shape: tuple[int,
     down = np.stack([np.interp(np.arange(shape[0]), points[0], line) for line in more.T], axis=1)
     between = np.stack([np.interp(np.arange(shape[1]), points[1], line) for line in down])
     assert np.allclose(found, np.hypot(errors, between) * (errors > 0), rtol=1e-5)
+
+
+@pytest.mark.parametrize(("channels", "step", "seen"), [(1, 3, False), (3, 4, True), (3, 1, False)])
+def test_light_in_shadow_is_summed_up_as_plain_numpy_does(channels: int, step: int, seen: bool) -> None:
+    rng, directions, shape = np.random.default_rng(7), ring(5, 40), (23, 1003)
+    normals = rng.normal((0, 0, 1), 0.5, (*shape, 3))
+    normals = (normals / np.linalg.norm(normals, axis=-1, keepdims=True)).astype(np.float32)
+    albedo = (rng.random((*shape, channels)) * (rng.random((*shape, 1)) > 0.1)).astype(np.float32)
+    cosines = np.einsum("ijk,lk->lij", normals, directions).astype(np.float32)
+    lit = np.maximum(cosines, 0) * (rng.random(cosines.shape) > 0.1)
+    plates = (lit[..., None] * albedo + rng.normal(0, 0.01, (5, *shape, channels))).astype(np.float32)
+    shown = np.array(rng.random(cosines.shape) > 0.1) if seen else None
+    given = task(
+        list(plates if channels > 1 else plates[..., 0]),
+        Illumination(directions=directions, intensities=np.ones((5, channels)), view=View()),
+        shown, None, Usable(saturation=0.8, dark_level=0.02), 0.0, 1.0,
+    )  # fmt: skip
+    n, a = (np.ascontiguousarray(np.moveaxis(each, -1, 0)) for each in (normals, albedo))
+    sums, counts, wider, left, showing = (np.zeros((-(-23 // step), -(-1003 // step)), np.float32) for _ in range(5))
+    indirect_rows(given, working_memory(given), n, a, sums, counts, wider, left, showing, 0, 23, step)
+
+    here = (plates < 0.8).all(axis=-1) & (True if shown is None else shown)
+    size, level = albedo.mean(axis=-1), plates.mean(axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        hindered = (cosines > FACING) & (level < SHADOWED * size * cosines)
+        unreached = here & (hindered | (cosines <= FACING) | (level < 0.02))
+        share = level / size - np.where(hindered, 0, np.maximum(cosines, 0))
+        beyond = level / size - np.maximum(cosines, 0)
+    known = (size > 0)[::step, ::step]
+    expected = (
+        np.where(unreached, np.clip(share, -MOST_INDIRECT, MOST_INDIRECT), 0).sum(axis=0),
+        unreached.sum(axis=0),
+        np.square(np.where(here, beyond, 0)).sum(axis=0),
+        (here & (np.maximum(level, size * cosines) > 0.02)).sum(axis=0),
+    )
+    for found, wanted in zip((sums, counts, left, showing), expected, strict=True):
+        np.testing.assert_allclose(found[known], wanted[::step, ::step][known], rtol=2e-3, atol=2e-4)
+        assert not found[~known].any()
+    reached = (here & ~unreached).sum(axis=0)[::step, ::step]
+    np.testing.assert_allclose(wider[known & (reached == 5)], 1, atol=1e-4)
+    assert np.median(wider[known & (reached == 4)]) > 1.1

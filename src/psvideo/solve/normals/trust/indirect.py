@@ -42,7 +42,7 @@ class IndirectLook:
 
     def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
         """Look at solved rows, whose samples lie where the solver's task says."""
-        from psvideo.solve.normals.trust.judging_kernel import indirect_rows
+        from psvideo.solve.normals.trust.indirect_kernel import indirect_rows
 
         shape = (-1, self.rows, self.given.cols)
         planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)

@@ -1,27 +1,15 @@
-"""The compiled loops of judging: noise through least squares and what is doubted beyond it, and light in shadow."""
-
-from typing import Any
+"""The compiled loops of judging: noise through least squares, and what is doubted beyond it."""
 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
-from psvideo.compute.symmetric import adjugate
 from psvideo.model.arrays import Bytes, Floats, Indices
-from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, TINY, ZERO
-from psvideo.solve.normals.loops.measuring import read_block
-from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
-from psvideo.solve.normals.task import LIGHTS, Samples, Spread, Task, Work
+from psvideo.solve.normals.loops.blocks import ONE, TINY, ZERO
+from psvideo.solve.normals.task import Samples, Spread
 
 TWO, MOST_FIT_DEG, LARGEST_DEG = np.float32(2), np.float32(60), np.float32(180)
-FACING = np.float32(0.05)  # the cosine up to which a light passes a surface by, where such light was not used
-SHADOWED = np.float32(0.25)  # of what a light would give, below which it is hindered
 LEAST_LEVEL = np.float32(0.25)  # of the light that shines straight on a surface, what is counted for noise at least
-MOST_WIDENED = np.float32(100)  # up to this many times the square spreads noise farther where fewer lights reach
-UNSOLVED_WIDENED = np.float32(5)  # the same where so few lights seem to reach that they could not have told the normal
-ROUGHLY = np.float32(1e4)  # the condition squared up to which lights are not nearly coplanar
-NO_EQUATIONS, TINIEST = (ZERO,) * 6, np.float32(1e-12)
-MOST_INDIRECT = np.float32(0.5)  # of the albedo: more is a highlight, or a wrong normal
 
 
 @FUSED.kept
@@ -132,103 +120,3 @@ def _place_columns(step: int, place: Indices, way: Floats) -> None:
     for col in range(place.shape[0]):
         place[col] = col // step
         way[col] = np.float32(col % step) * one
-
-
-@FUSED.inlined
-def _by_noise(read: np.float32, photon: np.float32, light: np.float32) -> np.float32:
-    """Return the weight of a light's measurement where it makes so much ``light`` straight above."""
-    off = LIGHTS * light
-    return np.float32(ONE / max(read + photon * light + off * off, TINIEST))
-
-
-@FUSED.inlined
-def _with_light(equations: Any, lamp: Any, weight: np.float32) -> Any:
-    """Return normal equations with one more light."""
-    a, b, c, d, e, f = equations
-    x, y, z = lamp
-    return (
-        a + weight * x * x,
-        b + weight * x * y,
-        c + weight * x * z,
-        d + weight * y * y,
-        e + weight * y * z,
-        f + weight * z * z,
-    )
-
-
-@FUSED.inlined
-def _across(equations: Any, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
-    """Return what of the covariance lies across a normal; 0 where there is none, or that of nearly coplanar lights."""
-    a, b, c, d, e, f = equations
-    xx, xy, xz, yy, yz, zz, determinant = adjugate(a, b, c, d, e, f)
-    sound = (determinant > ZERO) & ((a + d + f) * (xx + yy + zz) < ROUGHLY * determinant)
-    along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
-    return np.float32((xx + yy + zz - along) / determinant if sound else ZERO)
-
-
-@FUSED.inlined
-def _widened(some: Any, every: Any, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
-    """Return by how much what lies across a normal grows from the equations of every light to those of some."""
-    left, whole = _across(some, x, y, z), _across(every, x, y, z)
-    return np.float32(min(max(left / whole, ONE), MOST_WIDENED) if left > ZERO and whole > ZERO else UNSOLVED_WIDENED)
-
-
-@FUSED.kept
-def indirect_rows(
-    task: Task, work: Work, normals: Samples, albedo: Samples, sums: Floats, counts: Floats, wider: Floats,
-    squares: Floats, lights: Floats, first: int, last: int, step: int,
-) -> None:  # fmt: skip
-    """Add up what reaches every ``step``-th row and column from lights that do not, as a share of the albedo, by how
-    much farther noise spreads without these (``wider``), and the ``squares`` of what normals leave of all ``lights``
-    that show there, where these planes are not empty.
-
-    normals, albedo: as ``judge_rows`` takes them, zeros where there is none. The others: (row // step, col // step).
-    """
-    t = lent_task(task, work.matrix, work.per_strength)
-    n, a, values, total, count = lent(normals), lent(albedo), lent(work.values), lent(sums), lent(counts)
-    over, lit, looks, spreads = lent(squares), lent(lights), squares.size > 0, lent(wider)
-    channels, facing = t.tone.shape[1], FACING if t.ratio > ZERO else ZERO
-    each = ONE / np.float32(channels)
-    for row in range(-(-first // step) * step, last, step):
-        for col in range(0, t.cols, BLOCK):
-            width = min(BLOCK, t.cols - col)
-            read_block(t, values, row, col, width)
-            for i in range(-col % step, width, step):
-                size = ZERO
-                for channel in range(channels):
-                    size += decoded(a[channel, row, col + i]) * each * t.shares[channel]
-                if not size > ZERO:
-                    continue
-                nx, ny, nz = decoded(n[0, row, col + i]), decoded(n[1, row, col + i]), decoded(n[2, row, col + i])
-                sum_of, number, left, showing, some, every = ZERO, ZERO, ZERO, ZERO, NO_EQUATIONS, NO_EQUATIONS
-                for light in range(t.lights):
-                    lamp, per, dark = of_light(t.matrix, light), t.per_strength[light], t.dark[light]
-                    weight = _by_noise(t.noise[light, 0], t.noise[light, 1], size / (t.albedo_scale * at(per, i)))
-                    every = _with_light(every, at(lamp, i), weight)
-                    if not values[light * channels, i] > ABSENT:
-                        continue
-                    level = ZERO
-                    for channel in range(channels):
-                        level += values[light * channels + channel, i] * each * t.shares[channel]
-                    one = at(per, i)
-                    lx, ly, lz = at(lamp, i)
-                    cosine = (lx * nx + ly * ny + lz * nz) * one
-                    level *= one * t.albedo_scale
-                    dark *= one * t.albedo_scale
-                    beyond = level / size - max(cosine, ZERO)
-                    left += beyond * beyond
-                    showing += ONE if max(level, size * cosine) > dark else ZERO
-                    shadowed = (cosine > facing) & (level < SHADOWED * size * cosine)
-                    if shadowed | (cosine <= facing) | (level < dark):  # or lost in noise
-                        grazing = ZERO if shadowed else max(cosine, ZERO)
-                        share = level / size - grazing
-                        sum_of += min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
-                        number += ONE
-                    else:
-                        some = _with_light(some, (lx, ly, lz), weight)
-                total[row // step, (col + i) // step] = sum_of
-                count[row // step, (col + i) // step] = number
-                spreads[row // step, (col + i) // step] = _widened(some, every, nx, ny, nz)
-                if looks:
-                    over[row // step, (col + i) // step] = left
-                    lit[row // step, (col + i) // step] = showing
