@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.compute.ranks import median
 from psvideo.model.surface import Misfit, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.light_sigmas import light_sigmas, root_sigmas
@@ -62,14 +63,14 @@ class _Look:
             return cls(found=found, step=step)
         channels = found.albedo[::step][known].astype(np.float32).reshape(int(known.sum()), -1)
         light = np.linalg.norm(channels, axis=1)
-        bright = light >= np.median(light)
-        share, error_deg = np.median(sampled[known][bright]), np.median(found.error_deg[::step][known])
+        bright = light >= median(light)
+        share, error_deg = median(sampled[known][bright]), median(found.error_deg[::step][known].astype(np.float32))
         unit = float(solution.given.albedo_scale) * channels.shape[1] ** 0.5
         return cls(
             found=found,
             step=step,
-            misfit=Misfit(share=float(share), error_deg=float(error_deg)),
-            light=float(np.median(light[bright])) / unit,
+            misfit=Misfit(share=share, error_deg=error_deg),
+            light=median(light[bright]) / unit,
             least=float(how.least),
         )
 

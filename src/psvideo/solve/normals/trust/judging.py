@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for, thin
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Floats, Mask
@@ -165,7 +166,7 @@ def _typical_light(surface: Surface, one: Evidence) -> float:
     """Return the albedo that is typical of the brighter half of a surface."""
     step = one.step_of(surface.valid.shape)
     shown = brightness(surface.albedo[::step, ::step])[surface.valid[::step, ::step]]
-    return float(np.median(shown[shown >= np.median(shown)])) if shown.size else 0.0
+    return median(shown[shown >= median(shown)]) if shown.size else 0.0
 
 
 def looked_at(
