@@ -9,6 +9,7 @@ beside them. Levels are what is known of the ambient light.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -141,11 +142,15 @@ class Mixture:
 
     def bound(self) -> "ReadyMixture":
         """Return what a compiled loop needs."""
+        tables = {id(frame.tone.table): frame.tone.table for frame in self.frames if frame.tone.table.size}
+        if len(tables) > 1 or (tables and any(not frame.tone.table.size for frame in self.frames)):
+            return replace(self, frames=tuple(Coded(codes=frame.light()) for frame in self.frames)).bound()
+        return self._ready
+
+    @cached_property
+    def _ready(self) -> "ReadyMixture":
+        """Frames as they are, made ready once: a plate is looked at five times."""
         frames = self.frames
-        tables = {id(frame.tone.table): frame.tone.table for frame in frames if frame.tone.table.size}
-        if len(tables) > 1 or (tables and any(not frame.tone.table.size for frame in frames)):
-            frames = tuple(Coded(codes=frame.light()) for frame in frames)
-            return replace(self, frames=frames).bound()
         first = frames[0]
         taken = np.zeros((0, self.shape[0])) if self.taken is None else self.taken
         lies = [frame.codes for frame in frames if isinstance(frame.codes, np.ndarray)]
