@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from psvideo.compute.cubic_eight import EIGHT
 from psvideo.model.coded import Coded, Tone
 from psvideo.plates.align.between import columns_in
-from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, JUST_BELOW, blend_rows
+from psvideo.plates.align.blend_kernel import ROOM, blend_rows
 from psvideo.plates.align.packed import BAND_ROWS, packed
+from psvideo.plates.align.side_kernel import BESIDE, CLIPPED, JUST_BELOW, SideArrays
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
 from psvideo.plates.mixing.mixture import Mixture, mixture_of
 from psvideo.plates.mixing.several_pictures import combined
 
 ROWS, COLS = 22, 31
 COARSE = 11, 16
-FIRST, BAND, LEFT, RIGHT = 6, 8, 2, 31
+FIRST, BAND, LEFT, RIGHT = 6, 16, 2, 31
 SPANS_S, COUNTS, FULL = (0.4, -0.6), (0.6, 0.4), (0.9, 0.95, 1.0)
 Array = NDArray[np.float64]
 
@@ -57,26 +59,56 @@ def _shown(light: Array, marks: NDArray[np.uint8], full: float, x: float, y: flo
     return light[row, col] if mark == BESIDE else np.minimum(_interpolated(light, x, y), full * JUST_BELOW)
 
 
+def _sources(smooth: bool, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Source and guess: anything everywhere, or areas of one kind, so that pixels beside each other are made alike."""
+    sources = rng.integers(0, 5, (2, *COARSE)).astype(np.uint8)
+    if smooth:
+        sources[:] = np.array([BOTH, BEFORE, AFTER, AT_REST])[np.arange(COARSE[0]) % 4, None]
+        sources[0, 4, :4], sources[:, 5, 9:] = NOWHERE, NOWHERE
+    return sources
+
+
+def _velocity(smooth: bool, rng: np.random.Generator) -> NDArray[np.float32]:
+    if not smooth:
+        return rng.uniform(-12, 12, (2, *COARSE)).astype(np.float32)
+    row, col = np.mgrid[: COARSE[0], : COARSE[1]] / 10
+    return np.stack([3.1 + 0.9 * col - row, 2.3 - 0.7 * row + 0.8 * col]).astype(np.float32)
+
+
+def _between_nan(pictures: NDArray[np.float32]) -> list[NDArray[np.float32]]:
+    """The same pictures in memory before and behind which nothing may be read."""
+    size, around = pictures[0].size, 4 * COLS
+    rooms = [np.full(size + 2 * around, np.nan, np.float32) for _ in pictures]
+    for room, picture in zip(rooms, pictures, strict=True):
+        room[around : around + size] = picture.ravel()
+    return [room[around : around + size].reshape(pictures[0].shape) for room in rooms]
+
+
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("clips", [False, True])
 @pytest.mark.parametrize("all_seen", [False, True])
-def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_seen: bool) -> None:
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_seen: bool, smooth: bool) -> None:
     rng = np.random.default_rng(8)
-    source, guess = rng.integers(0, 5, (2, *COARSE)).astype(np.uint8)
-    velocity = rng.uniform(-12, 12, (2, *COARSE)).astype(np.float32)
-    lights = rng.choice([0.02, 0.4, 0.89], (2, ROWS, COLS, channels)).astype(np.float32)
-    marks = [rng.choice([0, BESIDE, CLIPPED], (ROWS, COLS)).astype(np.uint8) for _ in lights]
-    marks = marks if clips else [np.zeros((1, 1), np.uint8)] * 2
+    source, guess = _sources(smooth, rng)
+    velocity = _velocity(smooth, rng)
+    lights = _between_nan(rng.choice([0.02, 0.4, 0.89], (2, ROWS, COLS, channels)).astype(np.float32))
+    some = 0.97 if smooth else 0.2
+    marks = [rng.choice([0, BESIDE, CLIPPED], (ROWS, COLS), p=[some, *[(1 - some) / 2] * 2]) for _ in lights]
+    marks = [one.astype(np.uint8) for one in marks] if clips else [np.zeros((1, 1), np.uint8)] * 2
     seen_in = [np.ones((1, 1), np.bool_), rng.random((ROWS, 1)) < 0.8]
-    seen_in = seen_in[:1] * 2 if all_seen else [rng.random((ROWS, COLS)) < 0.8, seen_in[1]]
+    seen_in = seen_in[:1] * 2 if all_seen else [rng.random((ROWS, COLS)) < (0.98 if smooth else 0.8), seen_in[1]]
     rows_seen, stays = rng.random(BAND) < 0.8, rng.uniform(0, 0.8, (BAND, COLS, channels)).astype(np.float32)
     image, seen = np.full(stays.shape, -1, np.float32), rng.random((BAND, COLS)) < 0.9
     seen_before = seen.copy()
+    before, after = (
+        SideArrays(lights[n], 0, marks[n], seen_in[n], *(np.float32(own[n]) for own in (SPANS_S, COUNTS, FULL)))
+        for n in range(2)
+    )
     blend_rows(
-        source, guess, velocity, np.array(SPANS_S, np.float32), (ROWS, COLS), FIRST, LEFT, RIGHT,
-        *columns_in(COLS, COARSE[1]), np.full((2, COARSE[1] + 1), np.nan, np.float32), lights[0], lights[1],
-        np.array([0, 0]), marks[0], marks[1], seen_in[0], seen_in[1], np.array(COUNTS, np.float32),
-        np.array(FULL, np.float32), rows_seen, stays, image, seen,
+        source, guess, velocity, (ROWS, COLS), FIRST, LEFT, RIGHT, *columns_in(COLS, COARSE[1]),
+        np.zeros((ROOM, max(COLS, 3 * EIGHT)), np.float32), before, after, np.float32(FULL[2]), rows_seen, stays,
+        image, seen,
     )  # fmt: skip
     assert (image[:, :LEFT] == -1).all()
     assert (image[:, RIGHT:] == -1).all()
@@ -106,6 +138,25 @@ def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_se
             np.testing.assert_allclose(image[row, col], expected, atol=3e-5, err_msg=f"{row}, {col}, {what}")
             assert bool(seen[row, col]) == (known and given != NOWHERE), (row, col, what, given)
     assert {AT_REST, BEFORE, AFTER, BOTH, NOWHERE} == {*np.unique(guess)}
+
+
+def test_nothing_before_or_behind_a_plate_is_read() -> None:
+    lights = _between_nan(0.3 * np.random.default_rng(8).random((2, ROWS, COLS, 3), np.float32))
+    nothing, everything, one = np.zeros((1, 1), np.uint8), np.ones((1, 1), np.bool_), np.float32(1)
+    before, after = (
+        SideArrays(light, 0, nothing, everything, np.float32(span_s), np.float32(0.5), one)
+        for light, span_s in zip(lights, (1, -1), strict=True)
+    )
+    source, across = np.full(COARSE, BOTH, np.uint8), np.tile(np.arange(COARSE[1]) / 8, (COARSE[0], 1))
+    image, seen = np.full((ROWS, COLS, 3), np.nan, np.float32), np.zeros((ROWS, COLS), np.bool_)
+    for down in (-0.1, 0.1):  # of some eight pixels only columns are skipped or come twice
+        velocity = np.stack([across, np.full(COARSE, down)]).astype(np.float32)
+        blend_rows(
+            source, source, velocity, (ROWS, COLS), 0, 0, COLS, *columns_in(COLS, COARSE[1]),
+            np.zeros((ROOM, COLS), np.float32), before, after, one, np.ones(ROWS, np.bool_), image, image, seen,
+        )  # fmt: skip
+        assert image.max() < 0.45  # what is no number is cut off at 1, of which each plate counts a half
+        assert seen.all()
 
 
 @pytest.mark.parametrize(("least", "most"), [(-0.02, 1.0), (0.0, 0.3), (-3.0, 7.0)])

@@ -12,11 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.cubic_eight import EIGHT
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats, Image
 from psvideo.model.channels import brightest_channel
-from psvideo.plates.align.blend_kernel import BESIDE, CLIPPED, blend_rows
+from psvideo.plates.align.blend_kernel import ROOM, blend_rows
 from psvideo.plates.align.packed import BAND_ROWS, Packing, PutBy
+from psvideo.plates.align.side_kernel import BESIDE, CLIPPED, SideArrays
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST
 from psvideo.plates.light_plate import LightPlate
@@ -72,7 +74,7 @@ def plate_at(
     sources, columns = (source, source if guess is None else guess), columns_in(cols, source.shape[1])
 
     def fill(top: int, bottom: int) -> None:
-        packing.put(top, _filled(range(top, bottom), seen, own, sides, sources, motion, columns))
+        packing.put(top, _filled(range(top, bottom), seen, own, sides, sources, motion, *columns))
 
     over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
@@ -97,18 +99,18 @@ class _Side:
     plate: LightPlate
     read: Reader
     span_s: float
-    weight: np.float32
+    counts: np.float32
     within: Flags
 
     @classmethod
-    def of(cls, plate: LightPlate, motion: Followed, weight: float) -> "_Side":
+    def of(cls, plate: LightPlate, motion: Followed, counts: float) -> "_Side":
         own = plate.own.astype(np.uint8)
         within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)).reshape(own.shape) > 0
         return cls(
             plate=plate,
             read=plate.picture.reader(),
             span_s=motion.time_s - plate.time_s,
-            weight=np.float32(weight),
+            counts=np.float32(counts),
             within=np.ones((1, 1), np.bool_) if within.all() else within,
         )
 
@@ -134,7 +136,13 @@ class _Rows:
     def of(self, band: range) -> Image:
         return self.light[band.start - self.first : band.stop - self.first]
 
-    def marks(self) -> Codes8:
+    def arrays(self, total: np.float32) -> SideArrays:
+        """Return what a compiled loop takes of them, where both plates together count ``total``."""
+        side, full = self.side, np.float32(self.side.plate.saturation)
+        span_s, share = np.float32(side.span_s), side.counts / total
+        return SideArrays(_flat(self.light), self.first, self._marks(), side.within, span_s, share, full)
+
+    def _marks(self) -> Codes8:
         """Return what is clipped and what lies beside that, (row, col), or one 0 where nothing is."""
         light, full = self.light, self.side.plate.saturation
         if light.max() < full:
@@ -151,7 +159,8 @@ def _filled(
     sides: Sequence[_Side | None],
     sources: tuple[Codes8, Codes8],
     motion: Followed,
-    columns: tuple[NDArray[np.uintp], Floats],
+    columns: NDArray[np.uintp],
+    shares: Floats,
 ) -> Image:
     """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
     some, part = slice(band.start, band.stop), _part(sources, band, own.shape)
@@ -163,22 +172,22 @@ def _filled(
     image = np.empty(stays.shape, np.float32)
     for beside in (slice(0, part.start), slice(part.stop, None)):
         image[:, beside] = stays[:, beside]
-    none, nothing = np.zeros((1, 1, _channels(image)), np.float32), np.zeros((1, 1), np.uint8)
-    before, after = (none if one is None else _flat(one.light) for one in rows)
-    marks_before, marks_after = (nothing if one is None else one.marks() for one in rows)
-    seen_before, seen_after = (nothing > 0 if side is None else side.within for side in sides)
-    places, shares = columns
+    total = np.float32(sum(side.counts for side in sides if side is not None))
+    before, after = [_absent(image) if one is None else one.arrays(total) for one in rows]
+    room = np.zeros((ROOM, max(own.shape[1], 3 * EIGHT)), np.float32)
     blend_rows(
-        *sources, motion.velocity, np.array([0 if side is None else side.span_s for side in sides], np.float32),
-        (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
-        places, shares, np.empty((2, sources[0].shape[1] + 1), np.float32),
-        before, after, np.array([0 if one is None else one.first for one in rows], np.intp),
-        marks_before, marks_after, seen_before, seen_after,
-        np.array([0 if side is None else side.weight for side in sides], np.float32),
-        np.array([*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32),
-        np.ascontiguousarray(own.rows_seen[some]), _flat(stays), _flat(image), seen[some],
+        sources[0], sources[1], motion.velocity, (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
+        columns, shares, room, before, after, np.float32(own.saturation), np.ascontiguousarray(own.rows_seen[some]),
+        _flat(stays), _flat(image), seen[some],
     )  # fmt: skip
     return image
+
+
+def _absent(image: Image) -> SideArrays:
+    """Return the arrays of a plate that is gone: nothing of it was seen."""
+    light = np.zeros((1, 1, _channels(image)), np.float32)
+    nothing, none = np.zeros((1, 1), np.uint8), np.float32(0)
+    return SideArrays(light, 0, nothing, nothing > 0, none, none, np.float32(np.inf))
 
 
 def columns_in(cols: int, coarse: int) -> tuple[NDArray[np.uintp], Floats]:
