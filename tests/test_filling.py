@@ -119,6 +119,20 @@ def test_colours_that_meet_keep_their_own_albedo() -> None:
     assert (off < 0.2).mean() > 0.9
 
 
+def test_what_stands_before_a_wall_of_its_colour_does_not_lend_it_its_normal() -> None:
+    cols = np.broadcast_to(np.arange(SIZE), (SIZE, SIZE))
+    leaning = np.array([0.7, 0.1, 0.7]) / np.linalg.norm([0.7, 0.1, 0.7])
+    box = cols < SIZE // 2
+    normals = np.where(box[..., None], leaning, [0.0, 0.0, 1.0])
+    plates = plates_of(normals, np.where(box, 0.8, 0.35)[..., None] * np.array([0.9, 0.8, 1.0]))
+    shadow = ~box & (cols < SIZE // 2 + 20)
+    plates[1][shadow] = 0
+    surface = Solving().solve(plates, lit_by())
+    assert surface.source is not None
+    assert (surface.source[shadow] == TWO_LIGHTS).all()
+    assert angles_deg(surface.normals, normals)[shadow].mean() < 5
+
+
 def test_how_strong_the_lights_are_said_to_be_changes_the_albedo_only() -> None:
     normals, _ = ball()
     plates = plates_of(normals, np.array([0.5, 0.4, 0.3]))

@@ -14,7 +14,7 @@ from psvideo.model.arrays import Floats
 from psvideo.solve.filling.bucket_queue import BUCKETS, FOREVER, NONE, Queue, push, take_out
 from psvideo.solve.filling.hernandez2011 import from_one, from_two
 from psvideo.solve.filling.looking import Said
-from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours
+from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours, known_of, misfit
 from psvideo.solve.filling.tiles import THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
 
@@ -70,7 +70,7 @@ def _start(p: Tiles, s: Said, places: NDArray[np.int32], pixel: int) -> int:
     for side in range(4):
         y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
         if 0 <= y < p.rows and 0 <= x < p.cols and lights_at(p, y, x) == THREE_LIGHTS:
-            nearest = min(nearest, _step(p, s, row, col, y, x))
+            nearest = min(nearest, _step(p, s, y, x, row, col))
     return nearest
 
 
@@ -95,12 +95,15 @@ def _push_around(p: Tiles, s: Said, q: Queue, row: int, col: int, now: int, fart
 
 @FUSED.called
 def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
-    """The distance between neighbours, the longer the more their colours differ."""
+    """The distance from a pixel with a normal to its neighbour (y, x), the longer the more their colours differ, and
+    the less what is known of the former explains what lights show of the latter."""
     red, blue, noise = colour_of(p, s, row, col)
     red_there, blue_there, noise_there = colour_of(p, s, y, x)
     apart = (red - red_there) ** 2 + (blue - blue_there) ** 2
     allowed = SAME_COLOUR**2 + noise + noise_there
-    return int(np.float32(STEP) * (ONE + min(apart / allowed, MOST_STEPS)))
+    there = p.places[tile_at(p, y, x), y & WITHIN, x & WITHIN]
+    other_light = misfit(s, there, *known_of(p, row, col))
+    return int(np.float32(STEP) * (ONE + min(apart / allowed + other_light, MOST_STEPS)))
 
 
 @FUSED.called

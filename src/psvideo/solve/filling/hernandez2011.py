@@ -11,7 +11,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
-ALBEDO_SHARE = np.float32(0.05)  # how well the neighbours' albedo is that of a pixel
+ALBEDO_SHARE = np.float32(0.1)  # how well the neighbours' albedo is that of a pixel
 BENT = np.float32(np.radians(15.0))  # how well the neighbours' normal is
 BEYOND = np.float32(0.1)  # what faces away from the camera costs: squared over this
 ANGLES = np.radians(np.arange(-88.0, 89.0, 2.0)).astype(np.float32)

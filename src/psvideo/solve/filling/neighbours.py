@@ -11,6 +11,8 @@ from psvideo.solve.normals.loops.blocks import ONE, ZERO
 REACH_PX = 4  # neighbours are looked at so far in every direction,
 SPREAD_PX = 2.0  # with weights that fall off so,
 SAME_COLOUR = np.float32(0.015)  # and with the colour: shares of red and blue that differ so much weigh a half;
+SAME_LIGHT = np.float32(0.2)  # what would show a light that differs by this share of it weighs a quarter,
+LEAST_SHARE = np.float32(1e-3)  # and nothing less than this;
 WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0], np.float32)  # of neighbours that no, one, two or three lights reach
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
@@ -39,15 +41,44 @@ def colour_of(p: Tiles, s: Said, row: int, col: int) -> tuple[np.float32, np.flo
 
 
 @FUSED.inlined
+def known_of(p: Tiles, row: int, col: int) -> tuple[np.float32, np.float32, np.float32]:
+    """A pixel's albedo times its normal (x, y, z)."""
+    tile, y, x = tile_at(p, row, col), row & WITHIN, col & WITHIN
+    channels, albedo = p.albedo.shape[1], ZERO
+    for channel in range(channels):
+        albedo += decoded(p.albedo[tile, channel, y, x])
+    albedo /= np.float32(channels)
+    a, b, c = p.normals[tile, 0, y, x], p.normals[tile, 1, y, x], p.normals[tile, 2, y, x]
+    return albedo * decoded(a), albedo * decoded(b), albedo * decoded(c)
+
+
+@FUSED.inlined
+def misfit(s: Said, pixel: int, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
+    """By how much what an albedo times a normal (x, y, z) would show differs from what a pixel's lights show: the
+    square, over that of SAME_LIGHT of it; 0 where none shows anything.
+
+    What stands before a wall may have its colour, but seldom looks alike under two lights.
+    """
+    first, second = s.bright[pixel, 0], s.bright[pixel, 1]
+    size = first * first + second * second
+    if not size > ZERO:
+        return ZERO
+    first -= max(x * s.towards[pixel, 0, 0] + y * s.towards[pixel, 0, 1] + z * s.towards[pixel, 0, 2], ZERO)
+    second -= max(x * s.towards[pixel, 1, 0] + y * s.towards[pixel, 1, 1] + z * s.towards[pixel, 1, 2], ZERO)
+    return np.float32((first * first + second * second) / (SAME_LIGHT**2 * size))
+
+
+@FUSED.inlined
 def from_neighbours(
     p: Tiles, s: Said, row: int, col: int
 ) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those of its own
-    colour most; their bend is taken on, so that a round surface stays round."""
+    """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those most that have
+    its colour and explain its light; their bend is taken on, so that a round surface stays round."""
     channels = p.albedo.shape[1]
     red, blue, noise = colour_of(p, s, row, col)
     weight = albedo = nx = ny = nz = reds = blues = ZERO
     down = right = downs = rights = both = ZERO
+    pixel = p.places[tile_at(p, row, col), row & WITHIN, col & WITHIN]
     nx_down = ny_down = nz_down = nx_right = ny_right = nz_right = ZERO
     for y in range(max(row - REACH_PX, 0), min(row + REACH_PX + 1, p.rows)):
         v = y & WITHIN
@@ -72,6 +103,8 @@ def from_neighbours(
                 decoded(p.normals[tile, 1, v, u]),
                 decoded(p.normals[tile, 2, v, u]),
             )
+            fits = ONE / (ONE + misfit(s, pixel, there * THIRD * a, there * THIRD * b, there * THIRD * c))
+            w *= fits * fits + LEAST_SHARE
             dy, dx = np.float32(y - row), np.float32(x - col)
             weight += w
             albedo += w * there * THIRD
