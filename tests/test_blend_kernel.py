@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.compute.cubic_eight import EIGHT
+from psvideo.compute.eight_lanes import EIGHT
 from psvideo.model.coded import Coded, Tone
 from psvideo.plates.align.between import columns_in
 from psvideo.plates.align.blend_kernel import ROOM, blend_rows

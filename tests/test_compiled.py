@@ -15,9 +15,11 @@ import pytest
 
 import psvideo
 from psvideo.cli.console import compiling_said
+from psvideo.compute import compiled
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
 from psvideo.live.showing import smaller
 from psvideo.model.coded import Coded
+from psvideo.plates.align.velocity import moving_kernel
 from psvideo.plates.ambient import ambient_kernel
 from psvideo.runs.steps.compiling import USUAL, SmallTake, run_small
 from psvideo.solve.filling import looking
@@ -77,6 +79,12 @@ def test_kept_code_depends_on_every_module_that_is_compiled_into_it() -> None:
     assert len(digests) == 3
     for name in ("least_squares.kernel", "loops.near_kernel", "robust.equations", "robust.odd_of_four"):
         assert hasattr(importlib.import_module(f"psvideo.solve.normals.{name}"), "FUSED")
+
+
+def test_kept_code_depends_on_what_code_of_llvm_s_is_written_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    before, source = sources_digest(moving_kernel), compiled._source
+    monkeypatch.setattr(compiled, "_source", lambda path: source(path) + b" " * path.endswith("eight_lanes.py"))
+    assert sources_digest(moving_kernel) != before
 
 
 PARTS = {

@@ -29,12 +29,14 @@ from numba.core.caching import (
     NullCache,
 )
 from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 from numba.core.runtime.nrt import rtsys
 
 from psvideo.compute.loaded import loaded
 from psvideo.compute.parts import PART
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+_Written: Any = _Intrinsic
 _Cache: Any = FunctionCache
 _Files: Any = IndexDataCacheFile
 _NoCache: Any = NullCache
@@ -173,8 +175,8 @@ def folder_kept_in() -> Path | None:
 def sources_digest(module: ModuleType) -> str:
     """Return a digest of a module's source and of the modules of its package that compiled code in it is made of.
 
-    Those are the modules that it names, and that define what it names; where these have compiled functions, so go on.
-    Numbers that such a module imports count by their value.
+    Those are the modules that it names, and that define what it names; where these have compiled functions, or code of
+    LLVM's written by hand, so go on. Numbers that such a module imports count by their value.
     """
     parts: dict[str, bytes] = {}
     waiting = [module]
@@ -184,7 +186,7 @@ def sources_digest(module: ModuleType) -> str:
         if path is None or path in parts:
             continue
         parts[path] = _source(path)
-        if one is module or any(isinstance(value, Dispatcher) for value in vars(one).values()):
+        if one is module or any(isinstance(value, (Dispatcher, _Written)) for value in vars(one).values()):
             parts[path] += repr(_numbers(one)).encode()
             waiting += _named(one)
     return hashlib.sha256(b"".join(parts[path] for path in sorted(parts))).hexdigest()

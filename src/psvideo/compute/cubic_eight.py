@@ -7,48 +7,20 @@ each other or farther apart, five are taken, of which each place counts its four
 
 from typing import Any
 
-import llvmlite.ir
 from numba import types
 from numba.extending import intrinsic
 
 from psvideo.compute.cubic import WEIGHTS
+from psvideo.compute.eight_lanes import EIGHT, FLOATS, INT, INTS, ir, lanes, loaded, plus, spread, stored
 
-EIGHT = 8
-_ir: Any = llvmlite.ir
-_FLOAT, _INT, _BITS = _ir.FloatType(), _ir.IntType(32), _ir.IntType(EIGHT)
-_FLOATS, _INTS = _ir.VectorType(_FLOAT, EIGHT), _ir.VectorType(_INT, EIGHT)
-_FUSE = ("contract",)
-
-
-def _of(kind: Any, *lanes: float) -> Any:
-    """A vector of lanes, or of eight times one."""
-    return _ir.Constant(kind, [_ir.Constant(kind.element, lane) for lane in lanes * (EIGHT // len(lanes))])
-
-
-def _spread(builder: Any, value: Any, kind: Any) -> Any:
-    """Eight times a value."""
-    first = builder.insert_element(_ir.Constant(kind, _ir.Undefined), value, _INT(0))
-    return builder.shuffle_vector(first, first, _of(_INTS, 0))
-
-
-def _pointer(builder: Any, address: Any, bytes_on: int) -> Any:
-    return builder.inttoptr(builder.add(address, _ir.Constant(address.type, bytes_on)), _FLOATS.as_pointer())
-
-
-def _loaded(builder: Any, address: Any, bytes_on: int = 0) -> Any:
-    return builder.load(_pointer(builder, address, bytes_on), align=4, typ=_FLOATS)
-
-
-def _plus(builder: Any, total: Any, one: Any, other: Any) -> Any:
-    product = builder.fmul(one, other, flags=_FUSE)
-    return product if total is None else builder.fadd(total, product, flags=_FUSE)
+_BITS = ir.IntType(EIGHT)
 
 
 def _wholes(builder: Any, places: Any, counting: bool) -> Any:
     """The whole numbers below eight places; where they are ``counting`` up, without what they are to be beyond the
     first."""
-    wholes = builder.fptosi(places, _INTS)
-    return builder.sub(wholes, _of(_INTS, *range(EIGHT))) if counting else wholes
+    wholes = builder.fptosi(places, INTS)
+    return builder.sub(wholes, lanes(INTS, *range(EIGHT))) if counting else wholes
 
 
 def _any(builder: Any, flags: Any) -> Any:
@@ -63,14 +35,14 @@ def _begin_of_eight(typing_context: Any, across: Any, down: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         firsts, beyond = [], []
         for address, counting in zip(arguments, (True, False), strict=True):
-            wholes = _wholes(builder, _loaded(builder, address), counting)
-            first = builder.extract_element(wholes, _INT(0))
-            apart = builder.sub(wholes, _spread(builder, first, _INTS))
-            before, after = (_any(builder, builder.icmp_signed(how, apart, _of(_INTS, 0))) for how in "<>")
-            far = _any(builder, builder.icmp_unsigned(">", builder.add(apart, _of(_INTS, 1)), _of(_INTS, 2)))
+            wholes = _wholes(builder, loaded(builder, address), counting)
+            first = builder.extract_element(wholes, INT(0))
+            apart = builder.sub(wholes, spread(builder, first, INTS))
+            before, after = (_any(builder, builder.icmp_signed(how, apart, lanes(INTS, 0))) for how in "<>")
+            far = _any(builder, builder.icmp_unsigned(">", builder.add(apart, lanes(INTS, 1)), lanes(INTS, 2)))
             far = builder.or_(far, builder.and_(before, after))
-            firsts.append(builder.sub(first, builder.zext(before, _INT)))
-            beyond.append(builder.select(far, _INT(2), builder.zext(builder.or_(before, after), _INT)))
+            firsts.append(builder.sub(first, builder.zext(before, INT)))
+            beyond.append(builder.select(far, INT(2), builder.zext(builder.or_(before, after), INT)))
         return context.make_tuple(builder, made, [*firsts, *beyond])
 
     return made(types.intp, types.intp), generate
@@ -78,15 +50,15 @@ def _begin_of_eight(typing_context: Any, across: Any, down: Any) -> Any:
 
 def _weights(builder: Any, places: Any, first: Any, counting: bool, count: int) -> list[Any]:
     """The weights of eight places, by sample: of ``count`` from that before the ``first`` on, four or five."""
-    within, weights = builder.fsub(places, builder.sitofp(builder.fptosi(places, _INTS), _FLOATS)), []
+    within, weights = builder.fsub(places, builder.sitofp(builder.fptosi(places, INTS), FLOATS)), []
     for sample in range(4):
-        found = _of(_FLOATS, WEIGHTS[3][sample])
+        found = lanes(FLOATS, WEIGHTS[3][sample])
         for power in (2, 1, 0):
-            found = _plus(builder, _of(_FLOATS, WEIGHTS[power][sample]), found, within)
+            found = plus(builder, lanes(FLOATS, WEIGHTS[power][sample]), found, within)
         weights.append(found)
     if count == 4:
         return weights
-    none, begin = _of(_FLOATS, 0.0), _spread(builder, first, _INTS)
+    none, begin = lanes(FLOATS, 0.0), spread(builder, first, INTS)
     later = builder.icmp_signed("!=", _wholes(builder, places, counting), begin)
     return [builder.select(later, *two) for two in zip([none, *weights], [*weights, none], strict=True)]
 
@@ -97,8 +69,8 @@ def _sum_of(builder: Any, begin: Any, stride: Any, over: list[Any], beside: list
     for own in over:
         line: Any = None
         for place, weight in enumerate(beside):
-            line = _plus(builder, line, weight, _loaded(builder, begin, pixel * place))
-        total = _plus(builder, total, own, line)
+            line = plus(builder, line, weight, loaded(builder, begin, pixel * place))
+        total = plus(builder, total, own, line)
         begin = builder.add(begin, stride)
     return total
 
@@ -114,22 +86,22 @@ def _adding(channels: int, count: int) -> Any:
             pair = [builder.extract_value(one, n) for one in arguments[:3] for n in range(2)]
             address, stride, col, row, across, down = pair
             onto, into, share = arguments[3:]
-            over = _weights(builder, _loaded(builder, down), row, False, count)
-            beside = _weights(builder, _loaded(builder, across), col, True, count)
-            counts, most = (_spread(builder, builder.extract_value(share, n), _FLOATS) for n in range(2))
+            over = _weights(builder, loaded(builder, down), row, False, count)
+            beside = _weights(builder, loaded(builder, across), col, True, count)
+            counts, most = (spread(builder, builder.extract_value(share, n), FLOATS) for n in range(2))
             before = builder.add(
-                builder.mul(builder.sext(builder.sub(row, _INT(1)), stride.type), stride),
-                builder.mul(builder.sext(builder.sub(col, _INT(1)), stride.type), stride.type(4 * channels)),
+                builder.mul(builder.sext(builder.sub(row, INT(1)), stride.type), stride),
+                builder.mul(builder.sext(builder.sub(col, INT(1)), stride.type), stride.type(4 * channels)),
             )
             first = builder.add(address, before)
             for n in range(channels):
-                lanes = _of(_INTS, *((EIGHT * n + lane) // channels for lane in range(EIGHT)))
-                own = [[builder.shuffle_vector(one, one, lanes) for one in weights] for weights in (over, beside)]
-                line = builder.add(first, _ir.Constant(first.type, 4 * EIGHT * n))
+                pixels = lanes(INTS, *((EIGHT * n + lane) // channels for lane in range(EIGHT)))
+                own = [[builder.shuffle_vector(one, one, pixels) for one in weights] for weights in (over, beside)]
+                line = builder.add(first, ir.Constant(first.type, 4 * EIGHT * n))
                 light = _sum_of(builder, line, stride, own[0], own[1], 4 * channels)
                 light = builder.select(builder.fcmp_ordered("<", light, most), light, most)
-                made = _plus(builder, _loaded(builder, onto, 4 * EIGHT * n), counts, light)
-                builder.store(made, _pointer(builder, into, 4 * EIGHT * n), align=4)
+                made = plus(builder, loaded(builder, onto, 4 * EIGHT * n), counts, light)
+                stored(builder, made, into, 4 * EIGHT * n)
             return context.get_dummy_value()
 
         two: Any = types.UniTuple

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.cubic_eight import EIGHT
+from psvideo.compute.eight_lanes import EIGHT
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats, Image
 from psvideo.model.channels import brightest_channel

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.cubic_eight import EIGHT
+from psvideo.compute.eight_lanes import EIGHT
 from psvideo.compute.memory import lent
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.side_kernel import (

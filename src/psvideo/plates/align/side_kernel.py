@@ -8,13 +8,13 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.cubic import cubic_of_one, cubic_of_three, cubic_weights
 from psvideo.compute.cubic_eight import (
-    EIGHT,
     add_one,
     add_one_of_five,
     add_three,
     add_three_of_five,
     begin_of_eight,
 )
+from psvideo.compute.eight_lanes import EIGHT
 from psvideo.compute.memory import lent
 from psvideo.model.arrays import Codes8, Flags, Floats
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from psvideo.compute.eight_lanes import EIGHT
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.correlation import displacements
@@ -28,7 +29,7 @@ FAR = 2
 """Then this many displacements of all changing parts together are tried."""
 COARSE = 2
 """Sketches of FINE_PIXELS and more get a velocity in every second row and column: flow is no finer there."""
-BAND_PIXELS = 1 << 16
+BAND_PIXELS = 1 << 14
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +79,8 @@ class AllLights:
         out = np.empty(self.shape, np.float32)
 
         def run(first: int, last: int) -> None:
-            unlike_rows(self.befores, self.afters, self.spans_s, velocity, first, last, out)
+            room = np.zeros((4, -(-self.shape[1] // EIGHT) * EIGHT), np.float32)
+            unlike_rows(self.befores, self.afters, self.spans_s, velocity, first, last, room, out)
 
         over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
         return out
@@ -94,11 +96,15 @@ class AllLights:
 
     def stirs(self) -> Flags:
         """Return what is not at rest, shape (row, col)."""
-        count = np.zeros(self.shape, np.intp)
-        for one, other in self.codes:
+        rows, cols = (length * self.step for length in self.shape)
+
+        def still(light: int, _: int) -> Flags:
+            one, other = self.codes[light]
             change = cv2.GaussianBlur(cv2.subtract(other, one, dtype=cv2.CV_32F), (0, 0), FINEST_PX)
-            still = mean_over(np.asarray(change * change, np.float32), STILL_PX) < STILL_CODES**2
-            count += still[: self.step * len(count) : self.step, : self.step * count.shape[1] : self.step]
+            little = mean_over(np.asarray(change * change, np.float32), STILL_PX) < STILL_CODES**2
+            return np.asarray(little[: rows : self.step, : cols : self.step])
+
+        count = np.sum(over_ranges(still, self.count, each=1), axis=0, dtype=np.int16)
         return np.asarray(count < max(STILL_LIGHTS, STILL_SHARE * self.count))
 
     def proposed(self) -> list[Floats]:

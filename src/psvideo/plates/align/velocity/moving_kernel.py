@@ -3,6 +3,8 @@
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.eight_lanes import EIGHT
+from psvideo.compute.linear_eight import LEAST_COLS, linear_of_eight
 from psvideo.compute.memory import lent
 from psvideo.model.arrays import Codes8, Floats
 
@@ -36,32 +38,56 @@ def _steps(shape: tuple[int, int], coarse: tuple[int, int]) -> tuple[np.float32,
     return np.float32(shape[0]) / np.float32(coarse[0]), np.float32(shape[1]) / np.float32(coarse[1])
 
 
+@FUSED.called
+def _codes_at(picture: Codes8, x: Floats, y: Floats, codes: Floats) -> None:
+    """Fill ``codes`` with what a picture shows at places; all are as long, a number of times EIGHT."""
+    rows, cols = picture.shape
+    if cols < LEAST_COLS:
+        for place in range(codes.shape[0]):
+            codes[place] = _between(picture, y[place], x[place])
+        return
+    for place in range(0, 4 * codes.shape[0], 4 * EIGHT):
+        linear_of_eight(
+            picture.ctypes.data, (rows, cols), x.ctypes.data + place, y.ctypes.data + place, codes.ctypes.data + place
+        )
+
+
+@FUSED.inlined
+def _places(way: Floats, row: int, shape: tuple[int, int], span: np.float32, x: Floats, y: Floats) -> None:
+    """Fill ``x`` and ``y`` with the places of a row's pixels in a picture of a ``shape``, so long ago."""
+    high, wide = _steps(shape, way.shape[1:])
+    down, across, own = (np.float32(row) + HALF) * high - HALF, way[0, row], way[1, row]
+    for col in range(across.shape[0]):
+        x[col] = (np.float32(np.int32(col)) + HALF) * wide - HALF - across[col] * wide * span
+    for col in range(across.shape[0]):
+        y[col] = down - own[col] * high * span
+
+
 @FUSED.kept
 def unlike_rows(
-    befores: Codes8, afters: Codes8, spans_s: Floats, velocity: Floats, first: int, last: int, out: Floats
-) -> None:
+    befores: Codes8, afters: Codes8, spans_s: Floats, velocity: Floats, first: int, last: int, room: Floats,
+    out: Floats,
+) -> None:  # fmt: skip
     """Fill rows of ``out`` (row, col): how unlike the lights' plates before and after are at the ends of the way.
 
     ``befores`` and ``afters`` are (light, row, col), of as many pixels as ``out`` or more, ``spans_s`` (light, 2) the
-    times since and until them, and ``velocity`` (2, row, col) in pixels of ``out`` per second. Every light counts from
-    0 to 1, by Geman and McClure's function of the difference: a shadow that passes under one light does not outvote the
-    others.
+    times since and until them, and ``velocity`` (2, row, col) in pixels of ``out`` per second; ``room`` (4, col) is to
+    work in, whose columns are a number of times EIGHT. Every light counts from 0 to 1, by Geman and McClure's function
+    of the difference: a shadow that passes under one light does not outvote the others.
     """
     before, after, span, way, made = lent(befores), lent(afters), lent(spans_s), lent(velocity), lent(out)
-    high, wide = _steps(before.shape[1:], made.shape)
+    x, y, ones, others = lent(room)[0], lent(room)[1], lent(room)[2], lent(room)[3]
     for row in range(first, last):
-        down = (np.float32(row) + HALF) * high - HALF
-        for col in range(made.shape[1]):
-            x, y = way[0, row, col] * wide, way[1, row, col] * high
-            across = (np.float32(col) + HALF) * wide - HALF
-            total = ZERO
-            for light in range(before.shape[0]):
-                since, until = span[light, 0], span[light, 1]
-                one = _between(before[light], down - y * since, across - x * since)
-                other = _between(after[light], down + y * until, across + x * until)
-                square = (other - one) * (other - one)
-                total += square / (square + UNLIKE_SQUARE)
-            made[row, col] = total
+        total = made[row]
+        total[:] = ZERO
+        for light in range(before.shape[0]):
+            _places(way, row, before.shape[1:], span[light, 0], x, y)
+            _codes_at(before[light], x, y, ones)
+            _places(way, row, before.shape[1:], -span[light, 1], x, y)
+            _codes_at(after[light], x, y, others)
+            for col in range(total.shape[0]):
+                square = (others[col] - ones[col]) * (others[col] - ones[col])
+                total[col] += square / (square + UNLIKE_SQUARE)
 
 
 @FUSED.kept
