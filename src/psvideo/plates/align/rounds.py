@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.model.choices import Align, Rate
 from psvideo.model.rig import Light
@@ -192,7 +193,7 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     lights = [light for light in held.lights if light in instant.moving]
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
     instant.motion = motion = followed_at(pairs, instant.time_s)
-    shown = [taken_of(pair, motion, guessed=instant.guessed) for pair in pairs]
+    shown = over_ranges(lambda n, _: taken_of(pairs[n], motion, guessed=instant.guessed), len(pairs), each=1)
     guesses = sources = [one.source for one in shown]
     unknown = np.zeros_like(motion.moves)
     if not instant.guessed:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.brightness import SCALE, light_of
 from psvideo.plates.align.velocity.flow import TOE, Sketch
@@ -74,7 +75,7 @@ def unsure_by_lone_edges(shown: Sequence[InstantSketch], moves: Flags) -> list[F
 
 def _lone(shown: Sequence[InstantSketch], noise: float) -> Floats:
     """Return how much of an edge is alone, (row, col), as a step in the logarithm of light."""
-    edges = [_edges(one, noise) for one in shown]
+    edges = over_ranges(lambda n, _: _edges(shown[n], noise), len(shown), each=1)
     lit = np.sum([here for _, _, here in edges], axis=0, dtype=np.int16) >= FEWEST
     wide = [cv2.dilate(step * here, np.ones((BESIDE_PX, BESIDE_PX), np.uint8)) for step, _, here in edges]
     first, second = np.zeros((2, *lit.shape), np.float32)  # the widest two, so that each light is held against others

@@ -27,7 +27,6 @@ LEAST = np.float32(0.05) * CODES_EACH**2
 """Detail whose square is less than this shows nothing that could agree."""
 STRIDE = 2
 """Agreement is a mean over windows: every second velocity, in rows and columns, is enough."""
-BAND_PIXELS = 1 << 15
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,24 +59,22 @@ class BetweenLights:
         sketches, (row, col): one minus their correlation, 0 to 2, in the mean."""
         stride = STRIDE * self.details.shape[1] // self.shape[0]
         size = (max(window_px // stride | 1, 3),) * 2
-        total = np.zeros([-(-length // STRIDE) for length in self.shape], np.float32)
-        last = last_size = total
-        for place in range(len(self.details)):
-            detail = self._moved(place, velocity)
-            own_size = np.sqrt(cv2.blur(detail * detail, size))
-            if place:
-                total += 1 - cv2.blur(last * detail, size) / (last_size * own_size + LEAST)
-            last, last_size = detail, own_size
+        moved = over_ranges(lambda place, _: self._moved(place, velocity), len(self.details), each=1)
+        sizes = over_ranges(lambda place, _: np.sqrt(cv2.blur(moved[place] ** 2, size)), len(moved), each=1)
+
+        def unlike(place: int, _: int) -> Floats:
+            agree = cv2.blur(moved[place] * moved[place + 1], size)
+            return np.asarray(1 - agree / (sizes[place] * sizes[place + 1] + LEAST), np.float32)
+
+        total = np.zeros_like(moved[0])
+        for one in over_ranges(unlike, len(moved) - 1, each=1):
+            total += one
         total /= max(len(self.details) - 1, 1)
         return np.asarray(cv2.resize(total, self.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
     def _moved(self, place: int, velocity: Floats) -> Floats:
         out = np.empty([-(-length // STRIDE) for length in self.shape], np.float32)
-
-        def run(first: int, last: int) -> None:
-            moved_rows(self.details[place], self.since_s[place], velocity, STRIDE, first, last, out)
-
-        over_ranges(run, len(out), each=max(BAND_PIXELS // out.shape[1], 1))
+        moved_rows(self.details[place], self.since_s[place], velocity, STRIDE, 0, len(out), out)
         out -= MIDDLE
         return out
 
