@@ -11,7 +11,10 @@ from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
+from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.normal_equations import solved
+from psvideo.sync.rowfit.tracking.course import clock_through
+from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
 from psvideo.synth import Noise, TrueClock, TrueFlash, expose
 
@@ -108,6 +111,15 @@ def test_flashes_twice_as_long_are_no_slower_readout_with_missing_frames(make_pl
     short = tuple(replace(flash, duration_s=0.5 * flash.duration_s) for flash in film.flashes)
     with pytest.raises(PsvideoError, match=r"fits flashes of 0\.8 ms \(plan: 0\.4 ms\)"):
         timing_of(replace(film, flashes=short), filmed(film, frames=36))
+
+
+def test_anchors_that_rounding_alone_sets_apart_bend_no_clock_without_end(plan: Plan) -> None:
+    """The seed's middle may be that of frames that are fitted later: a bend of 2 us within 3e-17 s ended in a fault."""
+    at_s = np.array([0.25, np.nextafter(0.25, 1.0), 0.5, 1.0])
+    late_s = np.array([2e-4, 2e-4 - 2e-6, -2e-4, 2e-4])
+    beat = Beat(clock=FoundClock(phase_s=0.01, offset_ppm=40.0), row_time_s=1e-4, exposure_s=0.008)
+    clock = clock_through(plan, FrameTrack(index=np.arange(80), beat=beat, at_s=at_s, late_s=late_s))
+    assert np.abs(clock.bend(np.array([0.0, 1.0]))).max() < 1e-3
 
 
 def test_two_times_that_rows_tell_together_only_are_moved_together() -> None:

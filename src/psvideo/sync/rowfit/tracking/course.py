@@ -17,6 +17,8 @@ from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, tra
 TRACK_ROWS = 60
 GOOD_COURSE = 0.9
 """A course through the clip that takes away this share of the robust loss is not tried again from elsewhere."""
+TO_DECIMALS = 9
+"""Of seconds: anchors that are nearer than that to one another are one, which rounding alone sets apart."""
 MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
 """Frames before which others may be missing (or a share of all frames) until only an excellent fit is believed."""
 MOST_STRAYED_SHARE = 0.2
@@ -63,7 +65,7 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     numbering = seed.numbering
     kept = renumbered(rows, numbering)
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows))
-    tracked = replace(tracked, beat=replace(tracked.beat, clock=_clock_of(plan, tracked)))
+    tracked = replace(tracked, beat=replace(tracked.beat, clock=clock_through(plan, tracked)))
     index, unsure = settled(plan, kept, tracked.index, tracked.beat)
     placed = ends(plan, kept, index, tracked.beat)
     tracked = from_first_frame(kept, replace(tracked, index=placed.index))
@@ -98,10 +100,11 @@ def memory_frames(plan: Plan, rows: Profiles) -> int:
     return max(window_frames(plan), int(1.2 * plan.marker_s / rows.period_s))
 
 
-def _clock_of(plan: Plan, tracked: FrameTrack) -> FoundClock:
+def clock_through(plan: Plan, tracked: FrameTrack) -> FoundClock:
     """Return a straight clock through the track's anchors, or a bent one where they stray from it."""
     clock = tracked.beat.clock
-    at_s, first = np.unique(tracked.at_s, return_index=True)  # frames that are repeated throughout end where others do
+    # frames that are repeated throughout end where others do, and the seed's middle may be that of later frames
+    at_s, first = np.unique(tracked.at_s.round(TO_DECIMALS), return_index=True)
     late_s = tracked.late_s[first]
     if len(at_s) < 2:
         return clock
