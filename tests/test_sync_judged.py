@@ -12,7 +12,12 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.coarse import retime
+from psvideo.sync.rowfit.coarse import seed as seed_module
+from psvideo.sync.rowfit.coarse.search import losses, turned_clocks
+from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.normal_equations import solved
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import clock_through
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
@@ -330,3 +335,43 @@ def test_a_clock_of_which_one_window_alone_shows_anything_is_solved_for() -> Non
     hessian = np.diag([2.5e12, 0.0, 0.0, 0.0, 0.0, 0.0])
     known = known_of_bends(hessian, Knots(at_s=at_s, penalty=stiff.T @ stiff), 1e-7, 1.0)
     assert np.isfinite(np.linalg.solve(hessian + known, np.ones(6))).all()
+
+
+def test_a_clip_of_another_plan_is_searched_under_other_numberings_once(
+    make_plan: PlanMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither the search for a restart nor a course with many holes searches again what was searched."""
+    calls = []
+    searched = retime.regular_numberings
+
+    def counted(*args: object, **options: object) -> object:
+        calls.append(args)
+        return searched(*args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(seed_module, "regular_numberings", counted)
+    film = make_plan(height_px=ROWS, width_px=COLUMNS)
+    planned = with_camera(film, fps=film.camera.fps * 5 / 6, exposure_s=1.2 * film.camera.exposure_s)
+    with pytest.raises(NoStrobeError, match="frames a second"):
+        timing_of(planned, filmed(film, frames=80))
+    assert len(calls) == 2  # at the clip's beginning and in its middle
+
+
+@pytest.mark.parametrize("lights", [1, 3, 12])
+@pytest.mark.parametrize("shutter", [1.0, 0.25])
+def test_losses_of_square_pulses_are_those_of_any_pulses(lights: int, shutter: float, make_plan: PlanMaker) -> None:
+    """In windows, at clocks far off, where rows see two flashes, and where some see none."""
+    film = make_plan(height_px=ROWS, width_px=COLUMNS, lights=tuple("abcdefghijkl"[:lights]), shutter=shutter)
+    plan = replace(film, dark_s=0.6 * film.dark_s)
+    profiles = filmed(plan, frames=30)
+    rows = Profiles(
+        value=profiles,
+        index=np.arange(30),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(float(ROWS)),
+        window_start=np.array([0, 13], np.int64),
+    ).binned(9)
+    clocks = turned_clocks(np.linspace(0.0, plan.cycle_s, 40), np.array([-9000.0, 0.0, 9000.0]), 0.1)
+    beat = first_guess(plan)
+    sharp = losses(plan, rows, clocks, beat, place=rows.place)
+    general = losses(plan, replace(rows, restless=np.full(9, 1e-300)), clocks, beat, place=rows.place)
+    assert sharp == pytest.approx(general, rel=1e-9)

@@ -46,7 +46,7 @@ def parts_of(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, 
     within = found_within(plan, rows, inner) if inner else []
     if within:
         return within
-    parts = found_in_parts(plan, rows)
+    parts = found_in_parts(plan, rows, verdict.seed)
     if not parts:
         parts = found_beside_dark(plan, rows)
         if believed and len(parts) == 1 and not odd_somewhere(whole):

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.coarse.seed import gain_of
+from psvideo.sync.rowfit.coarse.seed import Seed, gain_of
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import chapters, lit_stretches, reach
@@ -34,10 +34,11 @@ Part = tuple[slice, ClipFit | None]
 """A stretch of frames, and its fit where the strobe is found in it."""
 
 
-def found_in_parts(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]:
+def found_in_parts(plan: Plan, rows: Profiles, seed: Seed) -> list[tuple[slice, ClipFit]]:
     """Return the frames of every part of a clip in which the strobe is found, and its fit; nothing where the strobe
-    neither started again nor stopped, or is not found for sure. ``rows`` are laid out from the picture's top row."""
-    return _found(plan, rows, chapters(plan, rows))
+    neither started again nor stopped, or is not found for sure. ``rows`` are laid out from the picture's top row;
+    ``seed`` is the whole clip's."""
+    return _found(plan, rows, chapters(plan, rows, seed))
 
 
 def found_beside_dark(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]:

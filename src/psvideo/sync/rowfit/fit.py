@@ -8,7 +8,7 @@ from psvideo.model.arrays import Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import regular_step, stood_in
-from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
+from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, explained
@@ -49,10 +49,12 @@ class ClipFit:
     edges are where that was not taken for LEDs' tails, else 0. ``across`` is how much of what split flashes show is
     explained (0 to 1) where flashes differ because the subject moves, else 0. ``unlit`` (frame,) are frames that were
     left out because no flash lights them. ``unsteady_s`` is by how much stretches of flashes are early or late, as a
-    root mean square over the clip, beyond their jitter. ``regular``: frames are missing or repeated by a rule.
+    root mean square over the clip, beyond their jitter. ``regular``: frames are missing or repeated by a rule. ``seed``
+    is where it began.
     """
 
     fit: Fit
+    seed: Seed
     rows: Profiles
     track: FrameTrack
     unlit: Mask
@@ -100,6 +102,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
     stray = jitter(plan, plain, as_seen) if best.slack_s == 0.0 else STEADY
     loose_s = unsteady_s(plan, plain, as_seen, stray)
     return ClipFit(
+        seed=seed,
         fit=replace(as_seen, shift_error_s=float(np.hypot(_error_s(plan, best, as_seen, stray), loose_s))),
         rows=plain,
         track=replace(tracked, index=with_unlit(whole, tracked.index, dark)),

@@ -111,42 +111,6 @@ def rests(rows: Rows, flashes: Flashes, weight: Doubles, first: int, last: int, 
 
 
 @EXACT.kept
-def losses_by_row(
-    rows: Rows,
-    flashes: Flashes,
-    phase_s: Doubles,
-    rate: Doubles,
-    spread: Doubles,
-    steepness: float,
-    first: int,
-    last: int,
-    found: Doubles,
-) -> None:
-    """Fill ``found`` (clock, row) with the robust loss of every clock in every row."""
-    frames, height = rows.value.shape
-    design = np.empty((frames, width(rows, flashes)))
-    rest = np.empty(frames)
-    weight = np.ones((frames, height))
-    for clock in range(first, last):
-        start_s = phase_s[clock] + rate[clock] * flashes.start_s
-        moved = Flashes(
-            start_s,
-            rate[clock] * flashes.duration_s,
-            flashes.unknown,
-            flashes.unknowns,
-            flashes.rise_s,
-            flashes.fall_s,
-            flashes.blur_s,
-        )
-        for row in range(height):
-            row_rest(rows, moved, weight, row, design, rest)
-            total = 0.0
-            for n in range(frames):
-                total += np.log1p(steepness * (rest[n] / spread[row]) ** 2)
-            found[clock, row] = total
-
-
-@EXACT.kept
 def brightnesses(rows: Rows, flashes: Flashes, weight: Doubles, first: int, last: int, found: Doubles) -> None:
     """Fill ``found`` (row, unknown) with the brightnesses fitted over all frames as one window."""
     size = flashes.unknowns + 2 * len(rows.beat_hz)

@@ -15,7 +15,7 @@ from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import stood_in
-from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
+from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
@@ -70,14 +70,15 @@ def odd_somewhere(found: ClipFit) -> bool:
     return bool(runs.max() > float(np.percentile(runs, 25)) + SUSPICIOUS)
 
 
-def chapters(plan: Plan, rows: Profiles) -> tuple[slice, ...]:
+def chapters(plan: Plan, rows: Profiles, seed: Seed) -> tuple[slice, ...]:
     """Return the stretches of frames between which the strobe started again or stopped, all frames as one where it did
-    neither."""
+    neither. ``seed`` is the whole clip's."""
     left, done = _moving_and_still(plan, rows)
     most = MOST_RESTARTS + len(left) + len(done)
     while left:
         part = left.pop()
-        at = _restart_in(plan, rows.take(part).one_window())
+        is_whole = part == slice(0, len(rows.value))
+        at = _restart_in(plan, rows.take(part).one_window(), seed if is_whole else None)
         if at is None:
             done.append(part)
         else:
@@ -111,13 +112,14 @@ def _stands(plan: Plan, rows: Profiles) -> Mask:
     return stands
 
 
-def _restart_in(plan: Plan, rows: Profiles) -> int | None:
-    """Return the first frame after a restart, nearest to where the strobe is seen best; None where there is none."""
+def _restart_in(plan: Plan, rows: Profiles, seed: Seed | None) -> int | None:
+    """Return the first frame after a restart, nearest to where the strobe is seen best (the ``seed``, where that is
+    known already); None where there is none."""
     if len(rows.value) < LEAST_AFTER + 3 * (len(plan.lit_slots) + 1):
         return None
     dark = unlit(plan, rows)
     lit = renumbered(rows, stood_in(rows, dark)) if dark.any() else rows
-    seed = find_seed(plan, lit)
+    seed = seed or find_seed(plan, lit)
     few = (lit.turned() if seed.beat.upward else lit).binned(TRACK_ROWS)
     kept = renumbered(few, seed.numbering)
     if not shows_strobe(plan, kept.take(seed.frames), seed.beat):

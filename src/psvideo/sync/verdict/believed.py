@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, gain_of
+from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, Seed, gain_of
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
@@ -52,11 +52,13 @@ FLASHES_DIFFER = 0.7
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
     """A fit, the plan under which it was made (another camera than the given plan's where that was wrong by far), and
-    whether it is to be believed. ``other``: flashes at other times that explain the clip as well."""
+    whether it is to be believed. ``seed`` is where the given plan's strobe was looked for first. ``other``: flashes at
+    other times that explain the clip as well."""
 
     plan: Plan
     found: ClipFit
     believed: bool
+    seed: Seed
     other: Beat | None = None
 
 
@@ -66,14 +68,15 @@ def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
     ``rows`` are laid out from the picture's top row.
     """
     found = find(plan, rows)
+    seed = found.seed
     if not doubtful(plan, found):
-        return _unless_elsewhere(Verdict(plan=plan, found=found, believed=True))
+        return _unless_elsewhere(Verdict(plan=plan, found=found, believed=True, seed=seed))
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found) and not _feigned(plan, found)
     if believed:
         rivals = _worth_trying(plan, meant, found)
         believed = not rivals or best_rival(meant, rows, rivals, beside=found) is None
-    return _unless_elsewhere(Verdict(plan=meant, found=found, believed=believed))
+    return _unless_elsewhere(Verdict(plan=meant, found=found, believed=believed, seed=seed))
 
 
 def _unless_elsewhere(verdict: Verdict) -> Verdict:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit import kernel, row_model
+from psvideo.sync.rowfit import row_model
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.coarse.search_kernel import losses_by_row
 from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
 
 ROBUST_STEEPNESS = 20.0
@@ -127,7 +128,7 @@ def losses(plan: Plan, rows: Profiles, clocks: TriedClocks, start: Beat, *, plac
     found = np.empty((len(phase_s), rows.value.shape[1]))
     spread = rows.spread
     over_ranges(
-        lambda a, b: kernel.losses_by_row(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
+        lambda a, b: losses_by_row(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
         len(phase_s),
         each=rows_of_a_part(rows.value.size),
     )

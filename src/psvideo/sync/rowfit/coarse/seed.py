@@ -46,12 +46,16 @@ FOLDS, FOLD_ROWS, FITS = 6, 12, 2
 
 @dataclass(frozen=True, kw_only=True)
 class Seed:
-    """A beat that fits the ``frames`` among those that a numbering keeps; ``share`` of the robust loss goes with it."""
+    """A beat that fits the ``frames`` among those that a numbering keeps; ``share`` of the robust loss goes with it.
+
+    ``retimed`` are the seeds under other numberings than the files', where those were looked for.
+    """
 
     beat: Beat
     frames: slice
     numbering: Numbering
     share: float
+    retimed: "tuple[Seed, ...] | None" = None
 
 
 def renumbered(rows: Profiles, numbering: Numbering) -> Profiles:
@@ -73,20 +77,33 @@ def find_seed(plan: Plan, rows: Profiles) -> Seed:
     reach_ppm = max(plan.clock_range_ppm, LEAST_REACH_PPM)
     coarse = rows.binned(SEED_ROWS)
     seed = _best(plan, coarse, as_numbered(rows), _stretches(plan, coarse), reach_ppm)
-    twin = twins(coarse)
+    twin, retimed = twins(coarse), None
     if seed.share < GOOD_SEED or twin.mean() > OFTEN:
+        retimed = list[Seed]()
         for other in _retimed(plan, coarse, twin, reach_ppm):
+            retimed.append(other)
             if 1 - other.share < CLEARER * (1 - seed.share):
                 seed = other
             if other.share > GOOD_SEED:
                 break
     if seed.share <= FAIR_SEED and reach_ppm < UNKNOWN_CLOCK_PPM:
-        wide = _best(plan, coarse, as_numbered(rows), _stretches(plan, coarse), UNKNOWN_CLOCK_PPM)
-        seed = max(seed, wide, key=lambda one: one.share)
-    return seed
+        seed = max(seed, _widely(plan, coarse), key=lambda one: one.share)
+    return seed if retimed is None else replace(seed, retimed=tuple(retimed))
 
 
-def other_seeds(plan: Plan, rows: Profiles) -> Iterator[Seed]:
+def _widely(plan: Plan, rows: Profiles) -> Seed:
+    """Return the best seed at any clock ratio: of short stretches, which need a quarter of the clocks and of the time
+    that long ones do for each; of long ones only where a short one shows something."""
+    stretches = _stretches(plan, rows)
+    shortest = min(frames.stop - frames.start for frames in stretches)
+    short = [frames for frames in stretches if frames.stop - frames.start == shortest]
+    seed = _best(plan, rows, as_numbered(rows), short, UNKNOWN_CLOCK_PPM)
+    if seed.share <= FAIR_SEED or len(short) == len(stretches):
+        return seed
+    return _best(plan, rows, as_numbered(rows), stretches, UNKNOWN_CLOCK_PPM)
+
+
+def other_seeds(plan: Plan, rows: Profiles, seed: Seed) -> Iterator[Seed]:
     """Yield seeds for clips that cannot be followed from the best one.
 
     The first comes from many short stretches, as frames may be missing all over, the second from regular numberings.
@@ -95,7 +112,8 @@ def other_seeds(plan: Plan, rows: Profiles) -> Iterator[Seed]:
     coarse = rows.binned(SEED_ROWS)
     runs = [_best(plan, coarse, as_numbered(rows), [run], reach_ppm) for run in _runs(plan, rows)]
     yield max(runs, key=lambda seed: seed.share)
-    yield from sorted(_retimed(plan, coarse, twins(coarse), reach_ppm), key=lambda seed: seed.share)[-1:]
+    retimed = _retimed(plan, coarse, twins(coarse), reach_ppm) if seed.retimed is None else seed.retimed
+    yield from sorted(retimed, key=lambda seed: seed.share)[-1:]
 
 
 def _retimed(plan: Plan, rows: Profiles, twin: Mask, reach_ppm: float) -> Iterator[Seed]:

@@ -48,7 +48,7 @@ def followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     course = _followed(plan, rows, seed)
     if course.share > GOOD_COURSE or not too_many(course.steps, 0, len(rows.value)):
         return course
-    for other in other_seeds(plan, rows.turned() if seed.beat.upward else rows):
+    for other in other_seeds(plan, rows.turned() if seed.beat.upward else rows, seed):
         again = _followed(plan, rows, other) if other.beat.upward == seed.beat.upward else course
         course = again if 1 - again.share < CLEARER * (1 - course.share) else course
         if course.share > GOOD_COURSE:
