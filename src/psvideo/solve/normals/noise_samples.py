@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +47,16 @@ class Differences:
         )
         return cls(detail=detail, level=level, rounding=rounding)
 
+    @cached_property
+    def of_codes(self) -> bool:
+        """Whether any plate holds codes."""
+        return bool(self.rounding.any())
+
     def variance(self, where: NDArray[np.intp]) -> float:
         """Return the variance of samples at some places (in one line), as large as rounding makes it at least: a
         twelfth of what blurred the codes is none of the samples'."""
         found = quantile(self.detail.ravel()[where] ** 2, LOW_SHARE) / LOW_OF_VARIANCE
-        rounded = median(self.rounding.ravel()[where]) / 12
+        rounded = median(self.rounding.ravel()[where]) / 12 if self.of_codes else 0.0
         return max(found - rounded, rounded)
 
 
@@ -84,13 +90,16 @@ def noise_samples(
 
     def lines(firsts: NDArray[np.intp], px: int) -> NDArray[np.floating]:
         """Return lines that lie ``px`` apart, three by three, (channel, 3, line, col)."""
-        part = rows_of(plate, (firsts + px * np.arange(3)[:, None]).ravel()) - np.float32(black_level)
-        part *= np.float32(scale)
+        part = rows_of(plate, (firsts + px * np.arange(3)[:, None]).ravel())
+        if black_level or scale != 1 or part.dtype != np.float32:
+            part = (part - np.float32(black_level)) * np.float32(scale)
         return np.moveaxis(part.reshape(3, len(firsts), cols, *plate.shape[2:] or (1,)), -1, 0)
 
     def of_mean(channels: NDArray[np.floating], px: int, each: int) -> Differences:
         blurred, gaps = zip(*(_blurred(channel, rng) for channel in channels), strict=True)
-        found = _differences(np.mean(blurred, axis=0), np.sqrt(np.mean(np.square(gaps), axis=0)), px, each)
+        squares = [np.square(one) for one in gaps if one is not None]
+        gap = np.sqrt(reduce(np.add, squares) / len(gaps)) if squares else None
+        found = _differences(reduce(np.add, blurred) / np.float32(len(blurred)), gap, px, each)
         return replace(found, detail=found.detail * np.sqrt(len(blurred)))
 
     channels = lines(firsts, 1)
@@ -99,25 +108,26 @@ def noise_samples(
     return NoiseSamples(beside=beside, apart=of_mean(lines(wide, APART_PX), APART_PX, each // fewer))
 
 
-def _differences(lines: NDArray[np.floating], gaps: Doubles, px: int, each: int) -> Differences:
+def _differences(lines: NDArray[np.floating], gaps: Doubles | None, px: int, each: int) -> Differences:
     """Return of ``lines`` (3, line, col), of which three lie ``px`` apart, the second differences over that distance,
-    of every ``each``-th place; ``gaps`` are between codes."""
+    of every ``each``-th place; ``gaps`` are between codes, None where there are none."""
     top, middle, bottom = lines
     down, three = top - 2 * middle + bottom, top + middle + bottom
     fine = down[:, : -2 * px] - 2 * down[:, px:-px] + down[:, 2 * px :]
     level = three[:, : -2 * px] + three[:, px:-px] + three[:, 2 * px :]  # white noise is in both, and not correlated
+    detail = fine.ravel()[::each] / np.float64(6)
     return Differences(
-        detail=fine.ravel()[::each] / np.float64(6),
+        detail=detail,
         level=level.ravel()[::each] / np.float64(9),
-        rounding=gaps[1, :, px:-px].ravel()[::each] ** 2,
+        rounding=np.zeros(detail.shape) if gaps is None else gaps[1, :, px:-px].ravel()[::each] ** 2,
     )
 
 
-def _blurred(lines: NDArray[np.floating], rng: np.random.Generator) -> tuple[NDArray[np.floating], Doubles]:
-    """Return a channel's lines with their codes blurred, and how far these are from each other, 0 without codes."""
+def _blurred(lines: NDArray[np.floating], rng: np.random.Generator) -> tuple[NDArray[np.floating], Doubles | None]:
+    """Return a channel's lines with their codes blurred, and how far these are from each other, None without codes."""
     codes = _codes_in(lines)
     if codes is None:
-        return lines, np.zeros(lines.shape)
+        return lines, None
     fine = lines.astype(np.float64)
     gaps = _gaps_between(codes, fine)
     return fine + gaps * (rng.random(lines.shape) - 0.5), gaps

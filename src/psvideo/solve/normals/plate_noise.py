@@ -85,7 +85,7 @@ def noise_of(
     beside = Differences.of_all([one.beside for one in found])
     at, variances = _by_level(beside)
     channels = 1 if len(plates[0].shape) == 2 else plates[0].shape[2]
-    spread = _Spread.of(beside, Differences.of_all([one.apart for one in found]), channels)
+    spread = _Spread.of(beside, Differences.of_all([one.apart for one in found]), channels, at, variances)
     alone = _line(at, spread.times(at) * variances)
     if lit is None or len(plates) <= 3:
         return alone
@@ -104,7 +104,8 @@ def spread_of(plates: Sequence[Samples] | Sequence[Mixture]) -> float:
     if sum(one.apart.detail.size for one in known) < LEAST_PIXELS:
         return 1.0
     beside, apart = (Differences.of_all(each) for each in ([one.beside for one in known], [one.apart for one in known]))
-    return _Spread.of(beside, apart, 1 if len(plates[0].shape) == 2 else plates[0].shape[2]).in_light
+    channels = 1 if len(plates[0].shape) == 2 else plates[0].shape[2]
+    return _Spread.of(beside, apart, channels, *_by_level(beside)).in_light
 
 
 def _left_over(of: Differences, matrix: Doubles) -> Differences:
@@ -136,9 +137,9 @@ class _Spread:
     in_light: float = 1.0
 
     @classmethod
-    def of(cls, beside: Differences, apart: Differences, channels: int) -> "_Spread":
-        """Light shows more of the picture than of its noise: there it is no more than in the dark."""
-        at, variances = _by_level(beside)
+    def of(cls, beside: Differences, apart: Differences, channels: int, at: Doubles, variances: Doubles) -> "_Spread":
+        """Light shows more of the picture than of its noise: there it is no more than in the dark. ``at`` and
+        ``variances`` are those of ``beside`` by level."""
         below = DARK * float(np.sqrt(variances[np.argmin(at)] / channels))
         near, far = _in_dark(beside, below, 1), _in_dark(apart, below, channels)
         if not 0 < LEAST_SPREAD * near < far:
