@@ -56,13 +56,12 @@ def average_rows(
     _place_middles(slots.shape[1], block, channels, left, right, way)
     held = -2
     for row in range(first, last):
-        unpack_row(old[0][row], old[1][row], old[2][row], then)
         if seen[row]:
             for place in range(len(share)):
                 spanned = min(old_slots[row, place] + ONE, np.float32(longest))
                 slots[row, place] = ONE if restarts[row, place] else spanned
                 share[place] = ONE / max(slots[row, place], ONE)
-            _over_pixels(share, block, cols, channels, shares)
+            alike = _over_pixels(share, block, cols, channels, shares)
             upper, part = _between(row, block, levels.shape[0])
             if upper != held:
                 if upper == held + 1:
@@ -73,13 +72,10 @@ def average_rows(
                 _across(levels[min(upper + 1, levels.shape[0] - 1)], left, right, way, below)
                 held = upper
             mix_row(given, row, line)
-            own = factor[row]
-            for sample in range(samples):  # loops over few arrays each become vectors
-                level[sample] = above[sample] + part * (below[sample] - above[sample])
-            for sample in range(samples):
-                there = then[sample] * level[sample]
-                then[sample] = there + (line[sample] * own - there) * shares[sample]
+            packed = lent(old[0][row]), old[1][row], old[2][row]
+            _blend(packed, above, below, part, line, factor[row], share[0], shares, alike, then)
         else:
+            unpack_row(old[0][row], old[1][row], old[2][row], then)
             for place in range(len(share)):
                 slots[row, place] = old_slots[row, place]
         pack_row(then, codes[row], least, step, narrow[row], row, channels)
@@ -143,17 +139,37 @@ def _add_beside(total: Floats, block: int, end: int, channels: int, sums: Floats
 
 
 @FUSED.inlined
-def _over_pixels(each: Floats, block: int, cols: int, channels: int, line: Floats) -> None:
-    """Repeat what is known of blocks for every sample of their row."""
+def _blend(
+    packed: tuple[Codes16, np.float32, np.float32], above: Floats, below: Floats, part: np.float32, line: Floats,
+    own: np.float32, share: np.float32, shares: Floats, alike: bool, then: Floats,
+) -> None:  # fmt: skip
+    """Fill ``then`` with a packed row of the light before, brought to its new level, and a share of the row ``line``:
+    one of every sample, or one of all of them."""
+    codes, least, step = packed
+    if alike:
+        for sample in range(then.shape[0]):
+            level = above[sample] + part * (below[sample] - above[sample])
+            there = (least + step * np.float32(codes[sample])) * level
+            then[sample] = there + (line[sample] * own - there) * share
+        return
+    for sample in range(then.shape[0]):
+        level = above[sample] + part * (below[sample] - above[sample])
+        there = (least + step * np.float32(codes[sample])) * level
+        then[sample] = there + (line[sample] * own - there) * shares[sample]
+
+
+@FUSED.inlined
+def _over_pixels(each: Floats, block: int, cols: int, channels: int, line: Floats) -> bool:
+    """Repeat what is known of blocks for every sample of their row, unless all are alike, which is returned."""
     other = np.int32(0)
     for place in range(each.shape[0]):
         other = np.int32(other | (each[place] != each[0]))
     if not other:  # as usual
-        line[:] = each[0]
-        return
+        return True
     for place in range(each.shape[0]):
         end = (place + 1) * block if place < each.shape[0] - 1 else cols
         line[place * block * channels : end * channels] = each[place]
+    return False
 
 
 @FUSED.inlined
