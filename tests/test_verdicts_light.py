@@ -14,6 +14,7 @@ from judged_footage import (
     ball,
     even,
     exposure,
+    facts_of,
     graded,
     lamps,
     looked_at,
@@ -129,6 +130,9 @@ def test_light_that_is_left_in_attached_shadow_is_said_where_no_dark_slot_shows_
     assert left is not None
     one = Observed(lights=("a",), in_shadow=[left])
     assert ambient(one).grade == grade
+    beside_dark = replace(one, facts=KeptFacts([facts_of(ambient=0.01)] * 3))  # which the dark slots hold none of
+    assert ambient(beside_dark).grade == grade.replace("unknown", "good")
+    assert ("haze, flare" in ambient(beside_dark).found) == (grade == "doubtful")
 
 
 @pytest.mark.parametrize(("ambient", "said"), [(0.03, False), (0.08, True)])

@@ -41,7 +41,8 @@ def ambient(observed: Observed) -> Judgement:
     if share > NOTICED and swing > MOST_SWING:
         found = f"{found[:-1]} and flickers or changes by {100 * swing:.0f} % (mains light, a screen, the sun)."
     elif share <= MOST_AMBIENT:
-        return Judgement(subject="ambient", grade="good", found=found)
+        left = _left_in_shadow(observed)
+        return _veiled(found, left) if left > IN_SHADOW else Judgement(subject="ambient", grade="good", found=found)
     elif observed.dark_evenness and float(np.median(observed.dark_evenness)) > EVEN:
         return Judgement(
             subject="ambient",
@@ -58,9 +59,26 @@ def ambient(observed: Observed) -> Judgement:
     )
 
 
+def _left_in_shadow(observed: Observed) -> float:
+    return float(np.median(observed.in_shadow)) if observed.in_shadow else 0.0
+
+
+def _veiled(found: str, left: float) -> Judgement:
+    """Say that light comes and goes with the lamps where they cannot reach: the dark slots hold none of it."""
+    return Judgement(
+        subject="ambient",
+        grade="doubtful",
+        found=f"{found} But where a light cannot reach, {100 * left:.0f} % of what it gives elsewhere is left, and only "
+        "while it flashes: haze, flare in the lens, or light thrown back by walls and by the subject itself. This tilts "
+        "normals towards the camera.",
+        advice="Clean the lens and shade it from the lights, clear the air, and hang black cloth behind and beside the "
+        "subject.",
+    )
+
+
 def _without_dark(observed: Observed) -> Judgement:
     """Judge ambient light by what is left in attached shadow, where no dark slot shows it."""
-    left = float(np.median(observed.in_shadow)) if observed.in_shadow else 0.0
+    left = _left_in_shadow(observed)
     if left > IN_SHADOW:
         return Judgement(
             subject="ambient",
