@@ -67,6 +67,27 @@ def test_a_good_take_passes_with_a_word_for_each_thing_and_nothing_is_written(
     assert listing(clip.parent) == before
 
 
+def test_an_alpha_channel_that_is_left_out_costs_nothing_and_what_costs_accuracy_is_a_reservation(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """normals said "with reservations" of what check called usable: of an alpha channel, and of H.264 as well."""
+    good = shot("good")
+    for path in sorted((good / "frames").glob("*.png")):
+        codes = read_picture(path, cv2.IMREAD_UNCHANGED)
+        colour = codes if codes.ndim == 3 else np.repeat(codes[..., None], 3, axis=2)
+        alpha = np.full(codes.shape[:2], 65535, codes.dtype)
+        cv2.imwrite(str(tmp_path / f"{path.stem}.png"), np.dstack([colour, alpha]))
+    shutil.copy(good / "plan.toml", tmp_path)
+    assert run("check", tmp_path) == 0
+    said = capsys.readouterr().out
+    assert "This take is usable." in said
+    assert "note      the PNG files' alpha channel is left out" in said
+    warned = Check(
+        clip="c", path=tmp_path, frames=1, looked_at=1, seconds=0.1, judgements=(), warnings=("H.264 costs accuracy",)
+    )
+    assert warned.verdict == "This take is usable, with reservations."
+
+
 @pytest.mark.parametrize(
     ("name", "subject", "words"),
     [

@@ -156,7 +156,7 @@ def test_exr_channels_are_found_in_a_layer_and_beside_alpha(tmp_path: Path) -> N
     write_exr(tmp_path / "alpha.exr", codes, names="RGBA")
     alpha = decode("exr", tmp_path / "alpha.exr")
     assert np.array_equal(alpha.codes, codes[..., :3])
-    assert alpha.header.warnings == ("the EXR files' alpha channel is left out",)
+    assert (alpha.header.warnings, alpha.header.notes) == ((), ("the EXR files' alpha channel is left out",))
 
 
 def test_exr_of_several_layers_or_none_is_refused(tmp_path: Path) -> None:
@@ -274,7 +274,7 @@ def test_png_alpha_is_left_out_with_a_note(tmp_path: Path) -> None:
     write_png(tmp_path / "x.png", codes)
     picture = decode("png", tmp_path / "x.png")
     assert np.array_equal(picture.codes, codes[..., :3])
-    assert picture.header.warnings == ("the PNG files' alpha channel is left out",)
+    assert (picture.header.warnings, picture.header.notes) == ((), ("the PNG files' alpha channel is left out",))
 
 
 def test_dpx_grey_of_ten_bits_is_filled_from_the_low_end(tmp_path: Path) -> None:

@@ -226,3 +226,16 @@ def test_a_light_that_is_stronger_than_the_rig_says_turns_normals_as_far_as_is_s
     off_deg = float(np.degrees(np.arccos(normal[2] / np.linalg.norm(normal))))
     assert off_deg > 3
     assert turned_deg(vectors) == pytest.approx(off_deg), "lights in a ring all do the same"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("shape", ["ball", "waves"])
+@pytest.mark.parametrize(("fault", "blamed"), [({"claimed_deg": 5}, "directions"), ({"sheen": (0.8, 6)}, "not quite")])
+def test_normals_that_are_off_are_laid_to_the_rig_where_another_one_explains_what_is_left(
+    shape: str, fault: dict[str, Any], blamed: str, seed: int
+) -> None:
+    """Of a matte bust under five lights, one 5 degrees off, the surface was said not to be quite matte."""
+    (line,) = result.accuracy(Footage(shape=shape, lights=5, solved=True, **fault).observed(seed))
+    assert line.grade == "doubtful"
+    assert blamed in line.found
+    assert ("directions" in line.found) == (blamed == "directions")

@@ -69,7 +69,10 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         encoding=encoding,
         curve_doubt=_curve_doubt(sequence.kind, plan, header),
         warnings=header.warnings + _curve_warnings(sequence.kind, plan, header) + level_warning(header, encoding),
-        notes=((passed_over,) if sequence.passed_over else ()) + _depth_note(header, encoding) + _turn_note(header),
+        notes=((passed_over,) if sequence.passed_over else ())
+        + header.notes
+        + _depth_note(header, encoding)
+        + _turn_note(header),
     )
 
 
@@ -113,7 +116,7 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         + level_warning(movie.header, encoding)
         + rate_warnings,
         places_per_frame=per_frame,
-        notes=notes + _turn_note(movie.header),
+        notes=movie.header.notes + notes + _turn_note(movie.header),
     )
 
 

@@ -42,7 +42,8 @@ class Header:
     further code adds ``signal_per_code``, where 0 to 1 is what the transfer curve is defined on; None: the largest code
     is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits). ``turn`` is how the file
     wants the picture turned; the sizes are those before. ``transfer`` is the curve that the file is tagged with.
-    ``shot`` is what the file says of camera, lens and reel, by the names of SHOT.
+    ``shot`` is what the file says of camera, lens and reel, by the names of SHOT. ``warnings`` say what may cost
+    accuracy, ``notes`` what is left out and costs none.
 
     Raises ValueError where the size is none that a picture has.
     """
@@ -63,6 +64,7 @@ class Header:
     transfer: str | None = None
     shot: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """See that the size can be one of a picture."""

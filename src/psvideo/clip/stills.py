@@ -71,7 +71,7 @@ class Photographs:
             encoding=self.encoding,
             stills=True,
             warnings=head.warnings,
-            notes=notes,
+            notes=(*notes, *head.notes),
         )
 
 

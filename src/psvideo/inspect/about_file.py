@@ -171,7 +171,7 @@ def _describe_image(path: Path, kind: str) -> Description:
         "cfa": header.cfa,
         "time_code": header.time_code,
     }
-    findings = [ok(looks(header)), *(warn(text) for text in header.warnings)]
+    findings = [ok(looks(header)), *(warn(text) for text in header.warnings), *(ok(text) for text in header.notes)]
     return Description(path=path, kind=f"{kind} image", facts=facts, findings=tuple(findings))
 
 

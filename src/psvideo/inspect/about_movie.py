@@ -27,6 +27,7 @@ def movie_findings(path: Path) -> Iterator[Finding]:
     range_ = "video range" if head.video_range else "full range"
     yield ok(f"transfer {head.transfer or 'not said'}, primaries {head.colour or 'not said'}, {range_}")
     yield from (warn(text) for text in head.warnings)
+    yield from (ok(text) for text in head.notes)
 
 
 def describe_preview(path: Path, results: Path) -> Description:

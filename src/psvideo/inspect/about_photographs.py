@@ -31,6 +31,7 @@ def photograph_findings(folder: Path) -> Iterator[Finding]:
     yield ok(f"as photographs, {counted(len(files), 'light')}: {span}, {pictures.kind}, {looks(pictures.header)}")
     yield ok(f"read as {pictures.transfer!r}, {pictures.because}")
     yield from (warn(text) for text in pictures.header.warnings)
+    yield from (ok(text) for text in pictures.header.notes)
     yield from _as_taken(pictures)
     beside = [*(f"{file.name} shows ambient light" for file in found.ambient), *_aside(found.left_aside)]
     if beside:

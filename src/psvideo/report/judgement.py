@@ -34,15 +34,16 @@ def usable(judgements: Sequence[Judgement]) -> bool:
     return all(one.grade != "bad" for one in judgements)
 
 
-def verdict_of(judgements: Sequence[Judgement]) -> str:
-    """Return the sentence that a report begins with."""
+def verdict_of(judgements: Sequence[Judgement], *, warned: bool = False) -> str:
+    """Return the sentence that a report begins with; ``warned``: the footage itself has something to be warned of."""
     grades = {one.grade for one in judgements}
     if "bad" in grades:
         subjects = list(dict.fromkeys(one.subject for one in judgements if one.grade == "bad"))
         return f"This take is not usable as it is: {', '.join(subjects)}."
     if any(one.grade == "doubtful" and one.subject in DECISIVE for one in judgements):
         return "This take is doubtful: see below before using it."
-    return "This take is usable." if "doubtful" not in grades else "This take is usable, with reservations."
+    reserved = warned or "doubtful" in grades
+    return "This take is usable, with reservations." if reserved else "This take is usable."
 
 
 def gravest_first(judgements: Sequence[Judgement]) -> tuple[Judgement, ...]:

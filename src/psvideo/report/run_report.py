@@ -53,8 +53,7 @@ class RunReport:
     @property
     def verdict(self) -> str:
         """The sentence that the report begins with."""
-        word = verdict_of(self.judgements)
-        return "This take is usable, with reservations." if self.warnings and word == "This take is usable." else word
+        return verdict_of(self.judgements, warned=bool(self.warnings))
 
     @property
     def findings(self) -> tuple[str, ...]:

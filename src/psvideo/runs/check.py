@@ -141,12 +141,13 @@ def judged_take(
                 _unseen(str(fault)),
                 saturation_of(take) or exposure_of_frames(_light_of(take, EXPOSED_FRAMES)),
             )
-            notes: tuple[str, ...] = ()
+            judged, notes = "", tuple[str, ...]()
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip)
             later = tuple(number for number in later if number > take.numbers[-1])
             lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
+            judged = clip.curve_doubt
             notes = tuple(note for note in timing.notes if timing.swing is None or note != timing.swing.sentence)
     return Check(
         clip=clip.name,
@@ -155,7 +156,8 @@ def judged_take(
         looked_at=len(take.numbers) + len(later),
         seconds=time.monotonic() - began,
         judgements=tuple(one.spelled(caller.spell) for one in lines),
-        notes=tuple(map(caller.spell, (*clip.warnings, *notes))),
+        warnings=tuple(caller.spell(one) for one in clip.warnings if one != judged),
+        notes=tuple(map(caller.spell, (*clip.notes, *notes))),
     )
 
 
@@ -196,7 +198,15 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     partly = len(take.numbers) < len(numbers)
     take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s if partly else None
     saturation, levels = saturation_of(take), levels_of(take)
-    judged = judgements(apart.plan, timing, observed, take_s=take_s, saturation=saturation, levels=levels)
+    judged = judgements(
+        apart.plan,
+        timing,
+        observed,
+        take_s=take_s,
+        curve_doubt=take.clip.curve_doubt,
+        saturation=saturation,
+        levels=levels,
+    )
     return (seen, *judged)
 
 

@@ -132,6 +132,8 @@ def _print_check(voice: Voice, check: "Check") -> None:
     voice.say(f"{check.path}: {check.verdict} ({looked})")
     for one in check.judgements:
         voice.say(f"  {_word(one.grade)} {one.subject:9} {one.sentence}")
+    for warning in check.warnings:
+        voice.say(f"  {'':8} warning   {warning}")
     for note in check.notes:
         voice.say(f"  {'':8} note      {note}")
     sys.stdout.flush()

@@ -63,7 +63,7 @@ def _parse_header(path: Path, data: bytes) -> tuple[Header, int]:
         bits=bits,
         transfer=TRANSFERS.get(data[801]),
         time_code=_time_code(struct.unpack_from(order + "I", data, 1920)[0]),
-        warnings=("the DPX files' alpha channel is left out",) if descriptor == 51 else (),
+        notes=("the DPX files' alpha channel is left out",) if descriptor == 51 else (),
     )
     return head, offset + height_px * _bytes_per_row(width_px * samples, bits, packing)
 

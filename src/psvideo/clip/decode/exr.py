@@ -194,7 +194,8 @@ def _header(file: Any, part: int, names: tuple[str, ...]) -> Header:
         colour=attributes.get("colorInteropID"),
         time_code=_time_code(attributes.get("timeCode")),
         shot=shot_of(attributes),
-        warnings=alpha + chroma,
+        warnings=chroma,
+        notes=alpha,
     )
 
 

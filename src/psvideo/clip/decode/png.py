@@ -54,13 +54,14 @@ def _parse_header(path: Path, data: bytes, tail: bytes) -> Header:
             f"{path}: says that it has {bits} bits and colours of type {colour_type}, which PNG does not have: it is "
             "damaged. Copy it again."
         )
-    alpha = "the PNG files' alpha channel is left out" if colour_type in ALPHA_TYPES else ""
+    alpha = ("the PNG files' alpha channel is left out",) if colour_type in ALPHA_TYPES else ()
     shades = f"the PNG files hold no more than {2**bits} {'colours' if colour_type == PALETTE else 'shades of grey'}"
-    coarse = f"{shades}, too few for shading; export them with 16 bits" if bits < 8 or colour_type == PALETTE else ""
+    coarse = (f"{shades}, too few for shading; export them with 16 bits",)
     return Header(
         width_px=width_px,
         height_px=height_px,
         channels=COLOUR_TYPES[colour_type],
         bits=max(bits, 8),
-        warnings=tuple(one for one in (alpha, coarse) if one),
+        warnings=coarse if bits < 8 or colour_type == PALETTE else (),
+        notes=alpha,
     )

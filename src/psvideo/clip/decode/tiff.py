@@ -116,11 +116,11 @@ def _header(path: Path, page: tifffile.TiffPage) -> Header:
             f"{path}: its photometric interpretation is {kind}; expected grey (black is zero) or RGB. "
             "Export the frames as such."
         )
-    warnings = ("the TIFF files' extra channels (alpha) are left out",) if page.samplesperpixel > channels else ()
+    notes = ("the TIFF files' extra channels (alpha) are left out",) if page.samplesperpixel > channels else ()
     return Header(
         width_px=page.imagewidth,
         height_px=page.imagelength,
         channels=channels,
         bits=sample_bits(path, page),
-        warnings=warnings,
+        notes=notes,
     )

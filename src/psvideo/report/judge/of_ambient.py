@@ -68,9 +68,9 @@ def _veiled(found: str, left: float) -> Judgement:
     return Judgement(
         subject="ambient",
         grade="doubtful",
-        found=f"{found} But where a light cannot reach, {100 * left:.0f} % of what it gives elsewhere is left, and only "
-        "while it flashes: haze, flare in the lens, or light thrown back by walls and by the subject itself. This tilts "
-        "normals towards the camera.",
+        found=f"{found} But where a light cannot reach, {100 * left:.0f} % of what it gives elsewhere is left, and "
+        "only while it flashes: haze, flare in the lens, or light thrown back by walls and by the subject itself. This "
+        "tilts normals towards the camera.",
         advice="Clean the lens and shade it from the lights, clear the air, and hang black cloth behind and beside the "
         "subject.",
     )

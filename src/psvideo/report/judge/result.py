@@ -25,6 +25,9 @@ LITTLE_NOISE_DEG = 1.0
 """Where noise turns normals by less, more light makes none of them trusted."""
 NOT_MATTE = 0.1
 """From this share of the light on that another rig would explain and this one cannot, directions are doubted."""
+MOSTLY = 0.7
+"""Or from this share of what is left over on: of matte subjects a rig that is off leaves little else (0.9 of it, one of
+five lights 5 degrees off; 0 under haze and of gloss, which no rig explains)."""
 HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
@@ -189,7 +192,7 @@ def _why_off(observed: Observed) -> tuple[str, str]:
         return "two lights are exchanged", "See the line on the rig"
     if fit is not None and other_strengths(observed.firing_lights, fit):
         return "some lights are not as strong as the rig says", "See the line on the rig"
-    if fit is not None and fit.excess > NOT_MATTE:
+    if fit is not None and fit.excess > min(NOT_MATTE, MOSTLY * fit.misfit):
         return (
             "other directions of the lights would explain more: they are a few degrees off, or the surface is glossy",
             "Measure the lights on a sphere beside the subject",

@@ -16,7 +16,8 @@ SCHEMA = "psvideo-check/1"
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What was found of one take, line by line; ``looked_at`` of its ``frames`` frames were decoded."""
+    """What was found of one take, line by line; ``looked_at`` of its ``frames`` frames were decoded. ``warnings`` say
+    what of the footage itself may cost accuracy, ``notes`` what else is worth a word."""
 
     clip: str
     path: Path
@@ -24,6 +25,7 @@ class Check:
     looked_at: int
     seconds: float
     judgements: tuple[Judgement, ...]
+    warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -34,7 +36,7 @@ class Check:
     @property
     def verdict(self) -> str:
         """The sentence that sums the lines up."""
-        return verdict_of(self.judgements)
+        return verdict_of(self.judgements, warned=bool(self.warnings))
 
 
 def check_record(check: Check) -> dict[str, object]:
@@ -50,6 +52,7 @@ def check_record(check: Check) -> dict[str, object]:
         "usable": check.usable,
         "verdict": check.verdict,
         "judgements": lines,
+        "warnings": list(check.warnings),
         "notes": list(check.notes),
         "frames": check.frames,
         "looked_at": check.looked_at,
@@ -107,7 +110,7 @@ def _grade(check: Check) -> str:
 
 def _take(check: Check) -> str:
     kind = _grade(check)
-    notes = "".join(f"<li>{html.escape(note)}</li>" for note in check.notes)
+    notes = "".join(f"<li>{html.escape(note)}</li>" for note in (*check.warnings, *check.notes))
     return (
         f'<section><div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(check.clip)}: '
         f"{html.escape(check.verdict)}</p></div>{judgement_lines(check.judgements)}"

@@ -31,7 +31,7 @@ def rgb_codes(path: Path, frame: av.VideoFrame) -> CodedPicture:
     video_range = frame.color_range == VIDEO_RANGE or (frame.color_range != FULL_RANGE and not full_by_name)
     zero, one = signal_range(bits, video_range=video_range)
     turn, askew = turn_of(frame)
-    alpha = "the movie's alpha channel is left out" if len(found) in (2, 4) else None
+    alpha = ("the movie's alpha channel is left out",) if len(found) in (2, 4) else ()
     header = Header(
         width_px=frame.width,
         height_px=frame.height,
@@ -43,7 +43,8 @@ def rgb_codes(path: Path, frame: av.VideoFrame) -> CodedPicture:
         turn=turn,
         transfer=transfer_of(frame),
         colour=gamut_of(frame),
-        warnings=tuple(warning for warning in (alpha, askew) if warning),
+        warnings=(askew,) if askew else (),
+        notes=alpha,
     )
     if not is_yuv:
         return CodedPicture(header=header, codes=found[0].copy() if len(found) < 3 else np.stack(found[:3], axis=-1))
