@@ -15,8 +15,9 @@ from psvideo.model.coded import Coded, StoredCodes, Tone
 from psvideo.plates.align.pack_kernel import MOST_CODE, pack_rows
 from psvideo.plates.mixing.mixture import Mixture
 
-BAND_ROWS = 128
-"""Of lower bands more of what is read moves into its neighbours; 64 rows and 256 take a tenth longer."""
+BAND_ROWS = 64
+"""Of lower bands more of what is read moves into its neighbours, higher ones fall out of the caches: 128 rows take a
+twentieth longer, 192 a seventh."""
 PutBy = Callable[[NDArray[Any]], NDArray[Any] | StoredCodes]
 """Puts codes by where they take no memory, if there is such a place; else returns them."""
 LEAST_STEP = 1e-12

@@ -2,7 +2,7 @@
 
 ``moving`` finds one velocity for every pixel, from the plates of all lights together (``followed`` has both records).
 It chooses between what ``all_lights`` propose: ``flow`` (dense optical flow, on 8-bit sketches made by
-``sketch_kernel`` and compared by their ``detail``), ``correlation`` (how far the picture shifted as a whole), and rest;
-``between_lights`` says whether neighbouring lights agree along it. Its loops are in ``moving_kernel``. ``brightness``
-removes changes of exposure first. ``vectors`` makes motion vectors for compositing.
+``sketch_kernel`` and compared by their ``detail``, loops in ``detail_kernel``), ``correlation`` (how far the picture
+shifted as a whole), and rest; ``between_lights`` says whether neighbouring lights agree along it. Its loops are in
+``moving_kernel``. ``brightness`` removes changes of exposure first. ``vectors`` makes motion vectors for compositing.
 """

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 
 from psvideo.model.arrays import Codes8, Floats
+from psvideo.plates.align.velocity.detail_kernel import code_detail, part_detail
 
 FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
 """Before they are compared, sketches are smoothed by the first, and most of what is wider than the second is removed:
@@ -20,10 +21,10 @@ def smoothed(codes: Codes8) -> Floats:
 
 def detail_of(codes: Codes8) -> Codes8:
     """Return the detail of a sketch's codes, and a part of their shading, in codes."""
-    smooth, window = smoothed(codes), (SHADING_PX, SHADING_PX)
-    shading = np.asarray(cv2.blur(smooth, window), np.float32)
-    detail = smooth - shading
-    contrast = np.sqrt(np.maximum(cv2.blur(detail * detail, window), 0))  # sums that run along rows round
-    detail *= np.float32(CONTRAST) / np.maximum(contrast, np.float32(CONTRAST))
-    detail += np.float32(1 - SHADING) * shading
-    return np.asarray(np.clip(detail + np.float32(64.5), 0, 255), np.uint8)
+    detail, window = smoothed(codes), (SHADING_PX, SHADING_PX)
+    shading = np.asarray(cv2.blur(detail, window), np.float32)
+    squares, made = np.empty_like(detail), np.empty(detail.shape, np.uint8)
+    part_detail(detail, shading, squares)
+    cv2.blur(squares, window, dst=squares)
+    code_detail(detail, shading, squares, np.float32(CONTRAST), np.float32(1 - SHADING), made)
+    return made
