@@ -213,8 +213,10 @@ def test_what_is_known_at_points_changes_steadily_between_them(shape: tuple[int,
     assert np.allclose(found, np.hypot(errors, between) * (errors > 0), rtol=1e-5)
 
 
-@pytest.mark.parametrize(("channels", "step", "seen"), [(1, 3, False), (3, 4, True), (3, 1, False)])
-def test_light_in_shadow_is_summed_up_as_plain_numpy_does(channels: int, step: int, seen: bool) -> None:
+@pytest.mark.parametrize(
+    ("channels", "step", "seen", "soft"), [(1, 3, False, 0.0), (3, 4, True, 0.0), (3, 1, False, 0.0), (3, 2, True, 0.2)]
+)
+def test_light_in_shadow_is_summed_up_as_plain_numpy_does(channels: int, step: int, seen: bool, soft: float) -> None:
     rng, directions, shape = np.random.default_rng(7), ring(5, 40), (23, 1003)
     normals = rng.normal((0, 0, 1), 0.5, (*shape, 3))
     normals = (normals / np.linalg.norm(normals, axis=-1, keepdims=True)).astype(np.float32)
@@ -230,15 +232,16 @@ def test_light_in_shadow_is_summed_up_as_plain_numpy_does(channels: int, step: i
     )  # fmt: skip
     n, a = (np.ascontiguousarray(np.moveaxis(each, -1, 0)) for each in (normals, albedo))
     sums, counts, wider, left, showing = (np.zeros((-(-23 // step), -(-1003 // step)), np.float32) for _ in range(5))
-    indirect_rows(given, working_memory(given), n, a, sums, counts, wider, left, showing, 0, 23, step)
+    indirect_rows(given, working_memory(given), n, a, sums, counts, wider, left, showing, np.float32(soft), 0, 23, step)
 
     here = (plates < 0.8).all(axis=-1) & (True if shown is None else shown)
     size, level = albedo.mean(axis=-1), plates.mean(axis=-1)
+    shade = np.maximum(cosines + soft * (1 - cosines), 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        hindered = (cosines > FACING) & (level < SHADOWED * size * cosines)
+        hindered = (cosines > FACING) & (level < SHADOWED * size * shade)
         unreached = here & (hindered | (cosines <= FACING) | (level < 0.02))
-        share = level / size - np.where(hindered, 0, np.maximum(cosines, 0))
-        beyond = level / size - np.maximum(cosines, 0)
+        share = level / size - np.where(hindered, 0, shade)
+        beyond = level / size - shade
     known = (size > 0)[::step, ::step]
     expected = (
         np.where(unreached, np.clip(share, -MOST_INDIRECT, MOST_INDIRECT), 0).sum(axis=0),

@@ -153,6 +153,6 @@ def test_three_lights_leave_nothing_and_six_are_solved_by_the_model(lights: int,
     ways = ring(lights, 35)
     found, one, _ = Solving(error=True).measured(shot(normals, ways, glossy), under(ways), mask=inside)
     assert (few_checked.turned_by_model_deg(found, 1, one, inside) is not None) == looked_at
-    model = Reflectance(curve=0.0, rough=0.5, broad=0.0, middle=0.0, narrow=0.0)
+    model = Reflectance(curve=0.0, rough=0.5, soft=0.0, broad=0.0, middle=0.0, narrow=0.0)
     by_model = replace(found, misfit=Misfit(share=0.01, error_deg=1.0, reflectance=model))
     assert few_checked.turned_by_model_deg(by_model, 1, one, inside) is None

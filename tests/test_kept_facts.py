@@ -25,7 +25,7 @@ def _facts(number: int, seed: random.Random, lights: int = 4) -> InstantFacts:
     def perhaps() -> float | None:
         return some() if seed.random() < 0.5 else None
 
-    reflectance = Reflectance(*(some() for _ in range(5))) if seed.random() < 0.5 else None
+    reflectance = Reflectance(*(some() for _ in range(6))) if seed.random() < 0.5 else None
     misfit = Misfit(share=some(), error_deg=some(), noise_deg=some(), reflectance=reflectance)
     return InstantFacts(
         number=number,
@@ -60,7 +60,7 @@ def test_facts_come_out_as_they_went_in_each_by_itself_and_in_turn(lights: int) 
 def test_a_round_takes_no_more_than_its_numbers() -> None:
     """Rounds of one take share the value at which their plates clip, and what their subject reflects."""
     seed, numbers, measured = random.Random(1), range(4000), []
-    white, reflectance = (1.0, 1.0, 1.0, 1.0), Reflectance(0.1, 0.0, 0.0, 0.2, 0.0)
+    white, reflectance = (1.0, 1.0, 1.0, 1.0), Reflectance(0.1, 0.0, 0.0, 0.0, 0.2, 0.0)
 
     def filmed(number: int) -> InstantFacts:
         misfit = Misfit(share=seed.random(), error_deg=seed.random(), noise_deg=seed.random(), reflectance=reflectance)

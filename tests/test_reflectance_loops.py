@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 LIGHTS, POINTS, TYPICAL = 7, 60, 0.4
 UP = np.array([0.0, 0.0, 1.0])
 POWERS = np.array([8.0, 32.0, 128.0])[:, None, None]
-MODEL = np.array([0.2, 0.4, 0.3, 0.2, 0.1])
+MODEL = np.array([0.2, 0.4, 0.15, 0.3, 0.2, 0.1])
 
 
 def unit(vectors: Array) -> Array:
@@ -70,7 +70,7 @@ def parts_of(measured: Array, towards: Array, half: Array, to_camera: Array, g: 
     c, h = (towards * normals).sum(axis=-1), np.maximum((half * normals).sum(axis=-1), 0)
     bright = (c > 0) * np.minimum(TYPICAL / size, MOST_BRIGHT)
     return np.concatenate(
-        [[measured / size, c * c * (c > 0), rough(normals, towards, to_camera, c)[0]], bright * h**POWERS]
+        [[measured / size, c * c * (c > 0), rough(normals, towards, to_camera, c)[0], 1 - c], bright * h**POWERS]
     )
 
 
@@ -93,7 +93,7 @@ def shown(rng: np.random.Generator, towards: Array, half: Array, to_camera: Arra
 def test_parts_are_what_each_number_of_the_model_adds(
     rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array
 ) -> None:
-    measured, found = rng.random((LIGHTS, POINTS)), np.empty((6, LIGHTS, POINTS))
+    measured, found = rng.random((LIGHTS, POINTS)), np.empty((7, LIGHTS, POINTS))
     fill_parts(measured, towards, half, to_camera, g, TYPICAL, found)
     np.testing.assert_allclose(found, parts_of(measured, towards, half, to_camera, g), rtol=1e-12, atol=1e-15)
 
@@ -101,7 +101,7 @@ def test_parts_are_what_each_number_of_the_model_adds(
 def test_what_no_vector_of_a_points_own_explains_is_left(
     rng: np.random.Generator, towards: Array, counts: Array
 ) -> None:
-    parts, left = rng.normal(size=(6, LIGHTS, POINTS)), np.empty((6, LIGHTS, POINTS))
+    parts, left = rng.normal(size=(7, LIGHTS, POINTS)), np.empty((7, LIGHTS, POINTS))
     weights = counts * rng.uniform(0.2, 1, counts.shape)
     take_off_own(towards, weights, parts, left)
     for point in range(POINTS):
@@ -111,7 +111,7 @@ def test_what_no_vector_of_a_points_own_explains_is_left(
 
 
 def test_the_models_equations_are_sums_over_lights_and_points(rng: np.random.Generator, counts: Array) -> None:
-    left, square, right = rng.normal(size=(6, LIGHTS, POINTS)), np.empty((5, 5)), np.empty(5)
+    left, square, right = rng.normal(size=(7, LIGHTS, POINTS)), np.empty((6, 6)), np.empty(6)
     add_squares(counts, left, square, right)
     np.testing.assert_allclose(square, np.einsum("lp,klp,jlp->kj", counts, left[1:], left[1:]), rtol=1e-10, atol=1e-9)
     np.testing.assert_allclose(right, np.einsum("lp,klp,lp->k", counts, left[1:], left[0]), rtol=1e-10, atol=1e-9)
@@ -119,9 +119,9 @@ def test_the_models_equations_are_sums_over_lights_and_points(rng: np.random.Gen
 
 def test_numbers_within_bounds_are_the_least_of_the_form(rng: np.random.Generator) -> None:
     """Its slope is 0 at what lies between the bounds, and leads beyond them elsewhere (Karush, Kuhn and Tucker)."""
-    least, most = np.array([-0.6, 0, 0, 0, 0]), np.array([0.6, 0, 5, 5, 5.0])
+    least, most = np.array([-0.6, 0, 0, 0, 0, 0]), np.array([0.6, 0, 0.35, 5, 5, 5.0])
     for _ in range(20):
-        design, wanted, found = rng.normal(size=(40, 5)), 3 * rng.normal(size=40), np.empty(5)
+        design, wanted, found = rng.normal(size=(40, 6)), 3 * rng.normal(size=40), np.empty(6)
         descend_within(design.T @ design, design.T @ wanted, least, most, found)
         slope = design.T @ (design @ found - wanted)
         assert ((found >= least) & (found <= most)).all()
@@ -148,17 +148,17 @@ def stepped(measured: Array, counts: Array, towards: Array, half: Array, to_came
     bright = min(TYPICAL / size, MOST_BRIGHT)
 
     def shade(of: Array) -> Array:
-        """What is matte, curved or rough counts by the albedo; highlights are those of the typical one."""
+        """What is matte, curved, rough or soft counts by the albedo; highlights are those of the typical one."""
         normals = unit(of)[None]
         c, h = towards @ normals[0], np.maximum(half @ normals[0], 0)
         added = rough(normals, towards[:, None], to_camera, c[:, None])[0, :, 0]
-        matte = np.linalg.norm(of) * (c + MODEL[0] * (c > 0) * c * c + MODEL[1] * added)
-        return np.asarray(matte + size * (c > 0) * bright * (MODEL[2:, None] * h ** POWERS[..., 0]).sum(axis=0))
+        matte = np.linalg.norm(of) * (c + MODEL[0] * (c > 0) * c * c + MODEL[1] * added + MODEL[2] * (1 - c))
+        return np.asarray(matte + size * (c > 0) * bright * (MODEL[3:, None] * h ** POWERS[..., 0]).sum(axis=0))
 
     small = 1e-6 * size
     slopes = np.stack([(shade(g + d) - shade(g - d)) / (2 * small) for d in small * np.eye(3)], axis=-1)
     h = np.maximum(half @ unit(g), 0)
-    shine = size * (towards @ g > 0) * bright * (MODEL[2:, None] * h ** POWERS[..., 0]).sum(axis=0)
+    shine = size * (towards @ g > 0) * bright * (MODEL[3:, None] * h ** POWERS[..., 0]).sum(axis=0)
     rest = np.abs(measured - shade(g))
     many = int(counts.sum())
     order = np.sort(rest[counts > 0])

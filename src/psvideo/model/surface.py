@@ -16,14 +16,15 @@ normals around it, or those alone. 0 is what the picture does not show."""
 
 
 class Reflectance(NamedTuple):
-    """What a subject shows beyond n . l: c^2, and what rough clay throws back towards the light, as shares of its
-    albedo; h^8, h^32 and h^128 in units of albedo.
+    """What a subject shows beyond n . l: c^2, what rough clay throws back towards the light, and 1 - c of what light
+    shines through, as shares of its albedo; h^8, h^32 and h^128 in units of albedo.
 
     c is n . l, and h is n . half way between light and camera.
     """
 
     curve: float
     rough: float
+    soft: float
     broad: float
     middle: float
     narrow: float

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for
 from psvideo.model.arrays import Bytes, Doubles, Floats, Mask
 from psvideo.model.rows.clipping import ROUNDING
+from psvideo.model.surface import Reflectance
 from psvideo.solve.depth.view import View
 from psvideo.solve.normals.illumination import Illumination
 
@@ -123,6 +124,7 @@ class Weights(NamedTuple):
     common: np.float32
     curve: np.float32  # what the subject reflects beyond n . l: the numbers of reflectance.Reflectance, in g's unit
     rough: np.float32
+    soft: np.float32
     broad: np.float32
     middle: np.float32
     narrow: np.float32
@@ -164,6 +166,9 @@ class Looks(Protocol):
 
     def memory(self) -> Work:
         """Return room for one thread."""
+
+    def knowing(self, reflectance: Reflectance | None) -> "Looks":
+        """Return the same, where it is known what the subject reflects beyond n . l."""
 
     def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
         """Look at rows of the result, whose samples lie where ``shown.plates`` say."""

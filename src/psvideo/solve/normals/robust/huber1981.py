@@ -94,7 +94,8 @@ def solve(
         model=model,
         unit=1 / float(solution.given.albedo_scale),
     )
-    solution.run(how, error=error, reflecting=model is not None, looks=looks)
+    knowing = None if looks is None else looks.knowing(model)
+    solution.run(how, error=error, reflecting=model is not None, looks=knowing)
     return replace(solution.surface(error=error), misfit=misfit)
 
 

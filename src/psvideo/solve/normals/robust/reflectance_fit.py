@@ -1,17 +1,19 @@
-"""How a subject reflects light beyond n . l, found from all of its pixels at once: a curve, roughness, highlights.
+"""How a subject reflects light beyond n . l, found from all of its pixels: curve, roughness, softness, highlights.
 
 A single pixel cannot tell a broad sheen from a turned normal. A subject can: its pixels face every way, and share
-what they are made of. The model is albedo * (c + curve c^2 + rough r) + broad h^8 + middle h^32 + narrow h^128, with
-c = n . l and h = n . half way between light and camera (J. F. Blinn, "Models of light reflection for computer
-synthesized pictures", 1977: varnish shines on every paint alike); low powers of c, as B. Shi et al. fit them per pixel
-("Bi-polynomial modeling of low-frequency reflectances", PAMI 2014). What clay, plaster, stone and cloth throw back
-towards the light is r = c max(l . v - c n . v, 0) / max(c, n . v), with v to the camera: M. Oren and S. K. Nayar,
-"Generalization of Lambert's reflectance model", 1994, without their angles.
+what they are made of. The model is albedo * (c + curve c^2 + rough r + soft (1 - c)) + broad h^8 + middle h^32 +
+narrow h^128, with c = n . l and h = n . half way between light and camera (J. F. Blinn, "Models of light reflection for
+computer synthesized pictures", 1977: varnish shines on every paint alike); low powers of c, as B. Shi et al. fit them
+per pixel ("Bi-polynomial modeling of low-frequency reflectances", PAMI 2014). What clay, plaster, stone and cloth throw
+back towards the light is r = c max(l . v - c n . v, 0) / max(c, n . v), with v to the camera: M. Oren and S. K. Nayar,
+"Generalization of Lambert's reflectance model", 1994, without their angles. Of skin, wax and marble light comes out
+again around where it went in: it shows beyond the edge of shadows and flattens normals, about as (c + w) / (1 + w),
+with soft = w / (1 + w) (S. Green, "Real-time approximations to subsurface scattering", GPU Gems, 2004).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.surface import Reflectance
 
+Kind = Literal["shining", "rough", "soft"]
 LEAST_POINTS = 50
 FOR_SHINE = 6
 """Five measurements leave two residuals: too few to tell a highlight from a normal (a photographed ball got worse)."""
@@ -31,15 +34,22 @@ ALTERNATIONS, SOLVED_AGAIN, REWEIGHTED = 4, 3, 4
 """How often model and normals follow each other, steps of the normals each time, and of the model's weights."""
 HOPELESS = 0.02
 """What explains no more at the second time is not looked at again."""
-NUMBERS, ROUGH, SHINE, LESS_LEFT = 5, 1, 2, 0.8
-"""The model's numbers, which of them is roughness, where highlights begin, and what roughness leaves at most of what is
-left without it, to count: under lights whose directions are wrong it explains a tenth, of clay half."""
+NUMBERS, ROUGH, SOFT, SHINE = 6, 1, 2, 3
+"""The model's numbers, which of them are roughness and softness, and where highlights begin."""
+LESS_LEFT, MUCH_LESS_LEFT, FEW_LEAVE = 0.8, 0.65, 0.3
+"""What roughness leaves at most of what is left without it, to count, and what softness does, under five lights too:
+under lights whose directions are wrong roughness explains a tenth, of clay half; softness explains a third of velvet,
+and half to nine tenths of skin."""
+OF_KIND: dict[Kind, int] = {"rough": ROUGH, "soft": SOFT}
+"""The number without which a model is none of its kind."""
 LEAST_ROUGH = 0.1
 """What is less rough (facets that lean by 9 degrees) turns normals by less than a degree. Other faults look like it."""
-PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3), 300.0
+LEAST_SOFT = 0.04
+"""What is less soft turns normals by about a degree."""
+PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3, 0.3), 300.0
 """The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
-MOST_CURVE, MOST_ROUGH, MOST_LOBE = 0.6, 1.5, 5.0
+MOST_CURVE, MOST_ROUGH, MOST_SOFT, MOST_LOBE = 0.6, 1.5, 0.35, 5.0
 MODEL_WIDTH = 2.0
 """Cauchy's width in standard deviations of all residuals."""
 OUTLYING = 3.0
@@ -99,14 +109,20 @@ def fitted(points: SubjectPoints) -> Reflectance | None:
     if len(g) < LEAST_POINTS:
         return None
     typical = median(sizes[known])
-    model, explained, *_ = alternated(points, g, typical, rough=False)
+    model, explained, *_ = alternated(points, g, typical)
     spread = np.linalg.svd(points.towards.mean(axis=1), compute_uv=False)
     rough, by_rough = np.zeros(NUMBERS), 0.0
     if spread[0] < WELL_SPREAD * spread[-1]:
-        rough, by_rough, *_ = alternated(points, g, typical, rough=True)
+        rough, by_rough, *_ = alternated(points, g, typical, "rough")
+    few = len(points.measured) < FOR_SHINE
+    shines = True
     if rough[ROUGH] >= LEAST_ROUGH and 1 - by_rough < LESS_LEFT * (1 - explained):
-        model, explained = rough, by_rough
-    elif len(points.measured) < FOR_SHINE:
+        model, explained, shines = rough, by_rough, False
+    soft, by_soft, *_ = alternated(points, g, typical, "soft")
+    much_less = FEW_LEAVE if few else MUCH_LESS_LEFT
+    if LEAST_SOFT <= soft[SOFT] < MOST_SOFT and 1 - by_soft < much_less * (1 - explained):
+        model, explained, shines = soft, by_soft, False
+    if shines and few:
         return None
     if explained < LEAST_EXPLAINED:
         return None
@@ -128,15 +144,17 @@ class ModelFollowed(NamedTuple):
 
 
 def alternated(
-    points: SubjectPoints, g: Doubles, typical: float, *, rough: bool, turns: int = ALTERNATIONS, least: float = -np.inf
-) -> ModelFollowed:
+    points: SubjectPoints, g: Doubles, typical: float, kind: Kind = "shining", *,
+    turns: int = ALTERNATIONS, least: float = -np.inf,
+) -> ModelFollowed:  # fmt: skip
     """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
     than the ``least``."""
     points, nothing = points.in_order(), ModelFollowed(np.zeros(NUMBERS), 0.0, g)
     model, explained = np.zeros(NUMBERS), 0.0
     for turn in range(turns):
-        model, explained = _model(points, g, typical, rough=rough)
-        if (turn and explained < HOPELESS) or (rough and not model[ROUGH]) or explained <= least:
+        model, explained = _model(points, g, typical, kind)
+        absent = kind in OF_KIND and not model[OF_KIND[kind]]
+        if (turn and explained < HOPELESS) or absent or explained <= least:
             return nothing
         for _ in range(SOLVED_AGAIN):
             g = _solved_again(points, g, model, typical)
@@ -189,7 +207,7 @@ def _left(points: SubjectPoints, weights: Doubles, parts: Doubles) -> Doubles:
     return left
 
 
-def _model(points: SubjectPoints, g: Doubles, typical: float, *, rough: bool) -> tuple[Doubles, float]:
+def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind) -> tuple[Doubles, float]:
     """Return the numbers of the model, and the share of the squares of what is left over that it explains.
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
@@ -206,7 +224,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, *, rough: bool) ->
         spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), 1e-4)
         per = COUNTED / spread**2 / points.counts.sum()
         add_squares(weights, left, square, right)
-        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, rough=rough)
+        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, kind)
         rest = own - np.tensordot(model, others, axes=1)
         if turn < REWEIGHTED - 1:
             weights = points.counts / (1 + (rest / (MODEL_WIDTH * spread)) ** 2)
@@ -214,13 +232,16 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, *, rough: bool) ->
     return model, 1 - after / max(before, 1e-30)
 
 
-def _bounded(square: Doubles, right: Doubles, *, rough: bool) -> Doubles:
-    """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, and
-    what is ``rough`` is not dark under grazing light as well."""
+def _bounded(square: Doubles, right: Doubles, kind: Kind) -> Doubles:
+    """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, what is
+    rough is not dark under grazing light as well, and what is soft has no curve of its own."""
     from psvideo.solve.normals.robust.reflectance_kernel import descend_within
 
-    least = np.array((-MOST_CURVE, 0.0, 0.0, 0.0, 0.0))
-    most = np.array((0.0 if rough else MOST_CURVE, MOST_ROUGH if rough else 0.0, MOST_LOBE, MOST_LOBE, MOST_LOBE))
+    least, most = np.array((-MOST_CURVE, *(0.0,) * 5)), np.array((MOST_CURVE, 0.0, 0.0, *(MOST_LOBE,) * 3))
+    if kind == "rough":
+        most[0], most[ROUGH] = 0.0, MOST_ROUGH
+    elif kind == "soft":
+        least[0], most[0], most[SOFT] = 0.0, 0.0, MOST_SOFT
     found = np.empty(NUMBERS)
     descend_within(square, right, least, most, found)
     return found

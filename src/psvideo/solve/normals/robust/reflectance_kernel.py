@@ -97,9 +97,10 @@ def fill_parts(
             parts[0, light, p] = measured[light, p] / size
             parts[1, light, p] = c * c * lit
             parts[2, light, p] = _roughness(c, facing, _facing(to_camera, p, towards[light, p]))[0]
-            parts[3, light, p] = lit * bright * h8
-            parts[4, light, p] = lit * bright * h32
-            parts[5, light, p] = lit * bright * (h32 * h32) ** 2
+            parts[3, light, p] = 1.0 - c
+            parts[4, light, p] = lit * bright * h8
+            parts[5, light, p] = lit * bright * h32
+            parts[6, light, p] = lit * bright * (h32 * h32) ** 2
 
 
 @FUSED.inlined
@@ -203,11 +204,12 @@ def solve_again(
             h31 = h7 * ((h7 * h) ** 2 * (h7 * h))
             h127 = h31 * ((h31 * h) ** 2 * (h31 * h))
             much = lit * bright
-            broad, middle, narrow = much * model[2], much * model[3], much * model[4]
+            broad, middle, narrow = much * model[3], much * model[4], much * model[5]
             matte[light] = measured[light, p] - size * h * (broad * h7 + middle * h31 + narrow * h127)
             by_h = 8 * broad * h7 + 32 * middle * h31 + 128 * narrow * h127
-            by_c, by_facing = 1 + 2 * model[0] * lit * c + model[1] * added_by_c, model[1] * added_by_facing
-            shade = c + model[0] * lit * c * c + model[1] * added
+            by_c = 1 - model[2] + 2 * model[0] * lit * c + model[1] * added_by_c
+            by_facing = model[1] * added_by_facing
+            shade = c + model[2] * (1 - c) + model[0] * lit * c * c + model[1] * added
             along = shade - by_c * c - by_h * h - by_facing * facing
             for i in range(3):
                 rows[light, i] = along * normal[i] + by_c * towards[light, p, i] + by_h * half[light, p, i]

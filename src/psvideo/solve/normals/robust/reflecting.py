@@ -76,9 +76,11 @@ def reflect(
     _fill_gradient(ways, lights, weights, kept, matte, w, v, m, n)
     fill_residuals(gradient, w, matte, e, n)
     _add_up(kept, _AFTER, e, n)
-    unseen = ONE if weights.rough > ZERO else ZERO
+    unseen = ONE if weights.rough > ZERO or weights.soft > ZERO else ZERO
+    more = ONE if weights.soft > ZERO else ZERO  # it turns normals where residuals do not show it, too
     for i in range(n):
         gained = (kept[_BEFORE + i] - kept[_AFTER + i]) / (CLEARLY * max(kept[_BEFORE + i], TINY))
+        gained += more
         holds = min(max(gained, ZERO), ONE) if w[COUNT + i] >= FROM_MEASUREMENTS else unseen
         kept[HOLDS + i] = holds
         w[X + i] = kept[_MATTE_X + i] + holds * (w[X + i] - kept[_MATTE_X + i])
@@ -98,6 +100,8 @@ def weigh_reflecting(
     find_scale(gradient, weights.least, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
     _take_off(ways, lights, weights, kept, values, n)
+    if weights.soft > ZERO:
+        _take_off_soft(ways, lights, weights, kept, values, n)
 
 
 @FUSED.called
@@ -193,10 +197,10 @@ def _fill_gradient(
             much, more = _shine(weights, half)
             curve, by_half = weights.curve * holds, more * holds * per_size
             added, rough_by_cosine, by_facing = _rough(cosine, facing, towards)
-            rough = weights.rough * holds
-            by_cosine = ONE + TWO * curve * cosine + rough * rough_by_cosine
+            rough, soft = weights.rough * holds, weights.soft * kept[HOLDS + i]
+            by_cosine = ONE - soft + TWO * curve * cosine + rough * rough_by_cosine
             by_facing *= rough
-            along = cosine + curve * cosine * cosine + rough * added
+            along = cosine + soft * (ONE - cosine) + curve * cosine * cosine + rough * added
             along -= by_cosine * cosine + by_half * half + by_facing * facing
             by_half *= to_half
             by_light = by_cosine + by_half
@@ -232,3 +236,19 @@ def _take_off(ways: Floats, lights: int, weights: Weights, kept: Floats, values:
             for i in range(n):
                 without = (plane[i] - kept[_SHINE + i]) * kept[_GAIN + i]
                 plane[i] = without if plane[i] > ABSENT else MISSING
+
+
+@FUSED.called
+def _take_off_soft(ways: Floats, lights: int, weights: Weights, kept: Floats, values: Floats, n: int) -> None:
+    """Leave of samples without highlights what a surface would show that lets no light through."""
+    channels = len(values) // len(ways)
+    for light in range(lights):
+        way = ways[light]
+        for i in range(n):
+            cosine = kept[_UNIT_X + i] * way[0, i] + kept[_UNIT_Y + i] * way[1, i] + kept[_UNIT_Z + i] * way[2, i]
+            soft = weights.soft * kept[HOLDS + i]
+            kept[_GAIN + i] = max(cosine, ZERO) / max(cosine + soft * (ONE - cosine), TINY)
+        for channel in range(channels):
+            plane = values[light * channels + channel]
+            for i in range(n):
+                plane[i] = plane[i] * kept[_GAIN + i] if plane[i] > ABSENT else MISSING

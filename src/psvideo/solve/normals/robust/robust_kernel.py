@@ -180,6 +180,7 @@ def _solve_block(
         if not summed:
             solve_plainly(task, w, m, room.errors, n)
         odd = list_unexplained(task, w, m, listed, n)
+        odd = n if weights.soft > ZERO else odd  # such a subject's normals are turned though they explain its light
         v[DOUBT : DOUBT + n] = ZERO
     whole = odd > n * MOST_APART
     if whole:

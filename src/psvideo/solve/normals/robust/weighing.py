@@ -61,7 +61,7 @@ def weights(
 ) -> Weights:  # fmt: skip
     """Return what the compiled loops take: ``noise`` is that of a dark measurement and per unit of light (variances),
     ``unit`` turns the model's highlights into the plates' unit of albedo."""
-    curve, rough, *shine = (0.0,) * 5 if model is None else model
+    curve, rough, soft, *shine = (0.0,) * 6 if model is None else model
     least = min(reweighting.noise, LEAST_CLAIMED * noise[0] ** 0.5) if noise[0] > 0 else reweighting.noise
     tukey = reweighting.loss == "tukey"
     return Weights(
@@ -78,6 +78,7 @@ def weights(
         common=np.float32(common),
         curve=np.float32(curve),
         rough=np.float32(rough),
+        soft=np.float32(soft),
         broad=np.float32(shine[0] * unit),
         middle=np.float32(shine[1] * unit),
         narrow=np.float32(shine[2] * unit),

@@ -5,6 +5,7 @@ much the model that fits all of the subject would turn them says how far they ma
 """
 
 from dataclasses import replace
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -20,7 +21,11 @@ from psvideo.solve.normals.robust.reflectance_fit import (
     LEAST_EXPLAINED,
     LEAST_POINTS,
     LEAST_ROUGH,
+    LEAST_SOFT,
+    MUCH_LESS_LEFT,
     ROUGH,
+    SOFT,
+    Kind,
     SubjectPoints,
     alternated,
     explained_evenly,
@@ -34,6 +39,8 @@ SHADOWED = 0.2
 LEAST_EVENLY = 0.05
 """Of what four lights leave of a matte subject a model explains up to 0.03 where all measurements count alike, though
 up to 0.9 of what its weights leave; of what shines a little 0.1, and much 0.5 to 0.9."""
+ENOUGH_LESS = 0.3
+"""Where softness leaves MUCH_LESS_LEFT over 1 and this of what others leave, it counts wholly."""
 TURNS = 2
 """How often model and normals follow each other: four times cost twice as much and say the same."""
 AROUND = 0.07
@@ -74,12 +81,16 @@ def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
     """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3), either
     one that shines or one that is rough, whichever is more. A model that explains LEAST_EVENLY counts nothing, one
     that explains twice as much wholly: what comes and goes by its noise would flicker."""
-    sizes, most = np.linalg.norm(g, axis=1), np.zeros(len(g))
+    sizes, most, left = np.linalg.norm(g, axis=1), np.zeros(len(g)), 1.0
     typical = median(sizes)
-    for rough in (False, True):
-        one = alternated(points, g, typical, rough=rough, turns=TURNS, least=LEAST_EXPLAINED)
+    for kind in get_args(Kind):
+        one = alternated(points, g, typical, kind, turns=TURNS, least=LEAST_EXPLAINED)
         holds = _beyond(explained_evenly(points, g, typical, one.model), LEAST_EVENLY)
-        holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if rough else 1.0
+        holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if kind == "rough" else 1.0
+        if kind == "soft":  # the last: it must leave much less than the others, or lights that are off look like it
+            holds *= _beyond(float(one.model[SOFT]), LEAST_SOFT)
+            holds *= min(_beyond(MUCH_LESS_LEFT * left / max(1 - one.explained, 1e-9), 1.0) / ENOUGH_LESS, 1.0)
+        left = min(left, 1 - one.explained)
         cosines = (one.g * g).sum(axis=1) / np.maximum(np.linalg.norm(one.g, axis=1) * sizes, 1e-12)
         most = np.maximum(most, holds * np.degrees(np.arccos(np.clip(cosines, -1, 1))))
     return most

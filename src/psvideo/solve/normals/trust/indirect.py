@@ -1,10 +1,11 @@
 """Light where lamps do not reach, how much farther noise spreads there, and what normals leave of plates that are
 unsure, looked for while a solver has the rows: reading plates again would cost as much."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.model.surface import Reflectance
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.evidence import Evidence, Indirect, Left
 from psvideo.solve.normals.light_sigmas import combined_noise, with_noise
@@ -15,13 +16,15 @@ from psvideo.solve.normals.task import Result, Task, Work, task
 
 @dataclass(frozen=True, kw_only=True)
 class IndirectLook:
-    """What is looked at of rows that were just solved: every ``step``-th, under the lights as they are (``given``)."""
+    """What is looked at of rows that were just solved: every ``step``-th, under the lights as they are (``given``).
+    ``soft``: the share of light that the subject lets through (``Reflectance``)."""
 
     given: Task
     rows: int
     step: int
     found: Indirect
     left: Left
+    soft: float = 0.0
 
     @classmethod
     def of(cls, one: Evidence, noise: PlateNoise) -> "IndirectLook":
@@ -40,6 +43,10 @@ class IndirectLook:
         """Return room for one thread."""
         return working_memory(self.given)
 
+    def knowing(self, reflectance: Reflectance | None) -> "IndirectLook":
+        """Return the same, where it is known what the subject reflects beyond n . l."""
+        return self if reflectance is None else replace(self, soft=reflectance.soft)
+
     def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
         """Look at solved rows, whose samples lie where the solver's task says."""
         from psvideo.solve.normals.trust.indirect_kernel import indirect_rows
@@ -47,4 +54,6 @@ class IndirectLook:
         shape = (-1, self.rows, self.given.cols)
         planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)
         given = self.given._replace(plates=shown.plates[: len(self.given.plates)], like=shown.like)
-        indirect_rows(given, work, planes, albedo, *self.found, *self.left, first, last, self.step)
+        indirect_rows(
+            given, work, planes, albedo, *self.found, *self.left, np.float32(self.soft), first, last, self.step
+        )

@@ -32,14 +32,14 @@ SOME, EVERY = 10 * BLOCK, 16 * BLOCK
 @FUSED.kept
 def indirect_rows(
     task: Task, work: Work, normals: Samples, albedo: Samples, sums: Floats, counts: Floats, wider: Floats,
-    squares: Floats, lights: Floats, first: int, last: int, step: int,
+    squares: Floats, lights: Floats, soft: np.float32, first: int, last: int, step: int,
 ) -> None:  # fmt: skip
     """Add up what reaches every ``step``-th row and column from lights that do not, as a share of the albedo, by how
     much farther noise spreads without these (``wider``), and the ``squares`` of what normals leave of all ``lights``
     that show there, where these planes are not empty.
 
     normals, albedo: (3, row, col) and (channel, row, col), zeros where there is none. The others: (row // step,
-    col // step).
+    col // step). ``soft``: what the subject lets through counts as the lights' own.
     """
     t = lent_task(task, work.matrix, work.per_strength)
     n, a, w = lent(normals), lent(albedo), lent(work.planes)
@@ -54,7 +54,7 @@ def indirect_rows(
             place_lights(t.matrix, t.per_strength, t.near, row, col, width)
             for light in range(t.lights):
                 _read_level(t, w, light, row, col + begin, step, points)
-                _add_light(t, w, light, begin, step, points)
+                _add_light(t, w, light, soft, begin, step, points)
             place, down = (col + begin) // step, row // step
             for point in range(points):
                 known = w[SIZE + point] > ZERO
@@ -106,7 +106,7 @@ def _read_level(task: Task, w: Floats, light: int, row: int, col: int, step: int
 
 
 @FUSED.inlined
-def _add_light(task: Task, w: Floats, light: int, begin: int, step: int, points: int) -> None:
+def _add_light(task: Task, w: Floats, light: int, soft: np.float32, begin: int, step: int, points: int) -> None:
     """Add one light to what is summed up of all."""
     lamp, strength, scale = of_light(task.matrix, light), task.per_strength[light], task.albedo_scale
     read, photon, darkest = task.noise[light, 0], task.noise[light, 1], task.dark[light]
@@ -118,12 +118,13 @@ def _add_light(task: Task, w: Floats, light: int, begin: int, step: int, points:
         one = size if size > ZERO else ONE
         cosine = (lx * w[X + point] + ly * w[Y + point] + lz * w[Z + point]) * per
         level, dark = w[LEVEL + point] * (per * scale), darkest * (per * scale)
-        beyond = level / one - max(cosine, ZERO)
+        shade = max(cosine + soft * (ONE - cosine), ZERO)
+        beyond = level / one - shade
         w[LEFT + point] += beyond * beyond if here > ZERO else ZERO
         w[SHOWING + point] += here if max(level, size * cosine) > dark else ZERO
-        shadowed = (cosine > facing) & (level < SHADOWED * size * cosine)
+        shadowed = (cosine > facing) & (level < SHADOWED * size * shade)
         unreached = shadowed | (cosine <= facing) | (level < dark)  # or lost in noise
-        share = level / one - (ZERO if shadowed else max(cosine, ZERO))  # less what grazes the surface
+        share = level / one - (ZERO if shadowed else shade)  # less what grazes the surface
         share = min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
         w[TOTAL + point] += share if unreached & (here > ZERO) else ZERO
         w[NUMBER + point] += here if unreached else ZERO

@@ -1,0 +1,109 @@
+"""Light that shines through a surface (skin, wax, marble) flattens normals; the whole subject shows by how much."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from ring_and_ball import ring
+
+from psvideo.model.surface import Surface
+from psvideo.solve.images import solve_images
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.robust import reflectance_fit
+from psvideo.solve.normals.solving import Solving
+
+Array = NDArray[np.float64]
+SIZE, NOISE = 72, 0.002
+UNEVEN = np.concatenate([ring(5, 50), ring(3, 25)])
+FIVE = np.concatenate([ring(4, 50), ring(1, 5)])
+FOUR = np.concatenate([ring(3, 50), ring(1, 5)])
+
+
+def head() -> tuple[Array, NDArray[np.bool_]]:
+    """Normals of something round with folds, and where it is."""
+    v, u = (1.05 * (2 * (each + 0.5) / SIZE - 1) for each in np.mgrid[:SIZE, :SIZE])
+    inside = u * u + v * v < 0.97
+    height = np.sqrt(np.maximum(1 - u * u - v * v, 0.01)) + 0.04 * np.sin(7 * u) * np.sin(9 * v)
+    down, across = np.gradient(height, 2.1 / SIZE)
+    normals = np.stack([-across, down, np.ones_like(height)], axis=-1)
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True), inside
+
+
+def lit_through(cosine: Array, share: float) -> Array:
+    """Light that comes out again around where it went in: lit beyond the edge of its shadow."""
+    return np.asarray(np.maximum(cosine + share, 0) / (1 + share))
+
+
+def filmed(ways: Array, shade: Callable[[Array], Array]) -> tuple[list[NDArray[np.float32]], Array, NDArray[np.bool_]]:
+    rng, (normals, inside) = np.random.default_rng(3), head()
+    paint = np.array([0.6, 0.45, 0.35]) * inside[..., None]
+    plates = [shade(normals @ way)[..., None] * paint for way in ways]
+    return [(each + rng.normal(0, NOISE, each.shape)).astype(np.float32) for each in plates], normals, inside
+
+
+def under(ways: Array) -> Illumination:
+    return Illumination(directions=ways, intensities=np.ones((len(ways), 3)))
+
+
+def off_deg(found: Surface, truth: Array, where: NDArray[np.bool_]) -> Array:
+    cosines = (found.normals[where].astype(np.float64) * truth[where]).sum(axis=-1)
+    return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1, 1))))
+
+
+@pytest.mark.parametrize(("ways", "share"), [(UNEVEN, 0.1), (UNEVEN, 0.3), (FIVE, 0.2)], ids=["eight", "wax", "five"])
+def test_what_light_shines_through_is_solved_as_what_it_is(ways: Array, share: float) -> None:
+    plates, normals, inside = filmed(ways, lambda cosine: lit_through(cosine, share))
+    found = solve_images(plates, ways)
+    off = off_deg(found, normals, inside)
+    assert off.mean() < 1.5, "7 to 14 degrees where it is taken for matte"
+    assert found.misfit is not None
+    assert found.misfit.reflectance is not None
+    assert found.misfit.reflectance.soft == pytest.approx(share / (1 + share), abs=0.03)
+    assert (found.valid & inside).sum() > 0.7 * inside.sum()
+    np.testing.assert_allclose(np.median(found.albedo[found.valid], axis=0), [0.6, 0.45, 0.35], rtol=0.06)
+
+
+def test_its_light_beyond_the_shadows_edge_is_not_taken_for_other_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    plates, normals, inside = filmed(UNEVEN, lambda cosine: lit_through(cosine, 0.2))
+    found = solve_images(plates, UNEVEN)
+    error_deg = found.error_deg
+    assert error_deg is not None
+    off = off_deg(found, normals, inside)
+    assert 0.6 < (off <= error_deg[inside]).mean() < 0.97
+    monkeypatch.setattr(reflectance_fit, "LEAST_SOFT", 1.0)
+    matte = solve_images(plates, UNEVEN)
+    assert off_deg(matte, normals, inside).mean() > 5 * off.mean()
+
+
+@pytest.mark.parametrize(
+    "shade",
+    [
+        lambda cosine: np.maximum(cosine, 0),
+        lambda cosine: np.maximum(cosine, 0) * (1 - 0.2 * np.maximum(cosine, 0)),
+        lambda cosine: np.maximum(cosine, 0) ** 1.2,
+    ],
+    ids=["matte", "flat", "steep"],
+)
+def test_what_ends_at_the_shadows_edge_is_not_soft(shade: Callable[[Array], Array]) -> None:
+    plates, *_ = filmed(UNEVEN, shade)
+    misfit = solve_images(plates, UNEVEN).misfit
+    assert misfit is None or misfit.reflectance is None or misfit.reflectance.soft == 0
+
+
+def test_lights_that_are_off_do_not_make_a_matte_subject_soft() -> None:
+    plates, *_ = filmed(UNEVEN, lambda cosine: np.maximum(cosine, 0))
+    for seed in range(5):
+        wrong = UNEVEN + np.radians(3) * np.random.default_rng(seed).normal(size=UNEVEN.shape) / np.sqrt(2)
+        misfit = solve_images(plates, wrong / np.linalg.norm(wrong, axis=1, keepdims=True)).misfit
+        assert misfit is None or misfit.reflectance is None or misfit.reflectance.soft == 0
+
+
+def test_four_lights_cannot_take_it_off_and_claim_what_it_turns() -> None:
+    plates, normals, inside = filmed(FOUR, lambda cosine: lit_through(cosine, 0.25))
+    found = Solving(error=True).solve(plates, under(FOUR), mask=inside)
+    off, error_deg = off_deg(found, normals, inside), found.error_deg
+    assert off.mean() > 5
+    assert error_deg is not None
+    assert (off <= 2 * error_deg[inside]).mean() > 0.9
+    assert ((off > 10) & found.valid[inside]).mean() < 0.02
