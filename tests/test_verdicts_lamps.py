@@ -208,6 +208,25 @@ def test_no_lamp_is_blamed_for_what_whole_frames_do() -> None:
     assert "exposure and gain first" in next(timing_and_order(timing, "rolling")).advice
 
 
+@pytest.mark.parametrize(("by", "word"), [(0.25, "grows by 2"), (-0.2, "fades by 1"), (0.03, "")])
+@pytest.mark.parametrize("rounds", [6, 12, 60])
+def test_a_lamp_that_warms_up_is_named_and_not_said_to_flicker(by: float, word: str, rounds: int) -> None:
+    noise = 1 + 0.002 * np.random.default_rng(3).standard_normal((rounds, 4))
+    levels = 0.3 * noise
+    levels[:, 1] *= 1 - max(by, 0) + by * np.linspace(0, 1, rounds)
+    said = lamps(Observed(lights=tuple("abcd"), facts=steady_but(levels)))
+    assert [line.grade for line in said] == (["doubtful"] if word else ["good"])
+    assert f"The light 'b' {word}" in said[0].found if word else "fire" in said[0].found
+
+
+def test_a_lamp_that_flickers_is_not_said_to_drift() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        levels = 0.3 * (1 + 0.04 * rng.standard_normal((9, 3)) * [1, 0, 0])
+        said = lamps(Observed(lights=("a", "b", "c"), facts=steady_but(levels)))
+        assert not any("grows" in line.found or "fades" in line.found for line in said)
+
+
 def test_one_light_is_not_compared_with_itself() -> None:
     assert [line.found for line in lamps(looked_at([even("a", 0.5)]))] == ["The light fires in every round."]
 

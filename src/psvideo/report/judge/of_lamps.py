@@ -5,11 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Doubles, Flags
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.swing import Swing
 from psvideo.model.units import listed
+from psvideo.report.judge.unsteady_lamps import swings, unsteady
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import TARGET_QUANTILE
@@ -21,10 +21,6 @@ CHECKED_FROM = 5
 """With fewer lights than these nothing shows that one of them gives less than the rig says, and all normals lean."""
 MISSED = 0.5
 """A flash that gives less than this share of its lamp's usual light did not fire as it should."""
-UNSTEADY = 0.02
-ALIKE = 0.6
-"""Lamps whose light changes together have this correlation from round to round; two that flicker have it by chance in
-one of eight takes of five rounds, three in one of thirty, four in one of a hundred."""
 NAMED = 4
 """This many lights or rounds are named one by one; of more, only how many."""
 
@@ -50,9 +46,9 @@ def lamps(
         shown = [one for one in facts if one.unseen_share == 0]
         said += _missed(observed.lights, shown, level[whole], usual, alive)
         if swing is None or swing.cause == "lamps":
-            said += _unsteady(observed.lights, shown, level[whole], usual, alive)
+            said += unsteady(observed.lights, shown, level[whole], usual, alive)
     if swing is not None and (swing.cause != "lamps" or not any(one.subject == "lights" for one in said)):
-        said.append(_swings(swing))
+        said.append(swings(swing))
     yield from said
     if (
         not any(one.subject == "lights" for one in said) and relative.max() > 0
@@ -230,44 +226,3 @@ def _missed(
                 f"({listed(numbers, NAMED)}).",
                 advice="Check its driver and supply; these rounds' normals are wrong.",
             )
-
-
-def _unsteady(
-    lights: Sequence[str],
-    facts: Sequence[InstantFacts],
-    level: NDArray[np.float64],
-    usual: NDArray[np.float64],
-    alive: NDArray[np.bool_],
-) -> Iterator[Judgement]:
-    """Say which lamps change from round to round while nothing moves, as far as that is known."""
-    still = np.array([one.moving_share == 0 for one in facts[1:]], bool)
-    steps = np.abs(np.diff(level, axis=0))[still]
-    if len(steps) < 4:
-        return
-    change = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
-    unsteady = alive & (change > UNSTEADY)
-    if unsteady.sum() > 1 and _together((level / np.maximum(usual, 1e-9))[:, unsteady], still):
-        yield _swings(Swing(share=float(change[unsteady].mean()), cause="either"))
-        return
-    for light, share, flickers in zip(lights, change, unsteady, strict=True):
-        if flickers:
-            yield Judgement(
-                subject="lights",
-                grade="doubtful",
-                found=f"The light {light!r} flickers: its level changes by {100 * share:.1f} % from round to round.",
-                advice="Check its driver and supply, and that no dimmer (PWM) is in its line.",
-            )
-
-
-def _together(level: Doubles, still: Flags) -> bool:
-    """Return whether lamps change together, as under another gain of the camera, and not each for itself: ``level``
-    (round, light) is what each gives of its usual light, ``still`` (round - 1,) between which rounds nothing moves."""
-    steps = np.diff(level, axis=0)[still]
-    each, mean = (steps**2).mean(), (steps.mean(axis=1) ** 2).mean()
-    apart = 1 / level.shape[1]
-    return bool(mean > (apart + (1 - apart) * ALIKE) * each)
-
-
-def _swings(swing: Swing) -> Judgement:
-    subject = "lights" if swing.cause == "lamps" else "gain"
-    return Judgement(subject=subject, grade="doubtful", found=swing.found, advice=swing.advice)

@@ -1,0 +1,86 @@
+"""Lamps that flicker from round to round or drift in the course of a take, and light that all of them share."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.arrays import Doubles, Flags
+from psvideo.model.swing import Swing
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.facts import InstantFacts
+
+UNSTEADY = 0.02
+DRIFTS, STEADILY = 0.05, 3.0
+"""A lamp drifts that gives so much more or less in the last third of a take than in the first, beside what the others
+do, and so many times more than it changes from round to round: one that flickers does not."""
+ALIKE = 0.6
+"""Lamps whose light changes together have this correlation from round to round; two that flicker have it by chance in
+one of eight takes of five rounds, three in one of thirty, four in one of a hundred."""
+
+
+def unsteady(
+    lights: Sequence[str],
+    facts: Sequence[InstantFacts],
+    level: NDArray[np.float64],
+    usual: NDArray[np.float64],
+    alive: NDArray[np.bool_],
+) -> Iterator[Judgement]:
+    """Say which lamps change from round to round while nothing moves, as far as that is known."""
+    still = np.array([one.moving_share == 0 for one in facts[1:]], bool)
+    steps = np.abs(np.diff(level, axis=0))[still]
+    if len(steps) < 4:
+        return
+    share = level / np.maximum(usual, 1e-9)
+    change = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
+    drift = _drift(share, alive)
+    drifts = alive & still.all() & (np.abs(drift) > np.maximum(DRIFTS, STEADILY * change))
+    for light, by in zip(np.array(lights)[drifts].tolist(), drift[drifts].tolist(), strict=True):
+        yield _drifting(light, by)
+    flicker = alive & (change > UNSTEADY) & ~drifts
+    if flicker.sum() > 1 and _together(share[:, flicker], still):
+        yield swings(Swing(share=float(change[flicker].mean()), cause="either"))
+        return
+    for light, by, flickers in zip(lights, change, flicker, strict=True):
+        if flickers:
+            yield Judgement(
+                subject="lights",
+                grade="doubtful",
+                found=f"The light {light!r} flickers: its level changes by {100 * by:.1f} % from round to round.",
+                advice="Check its driver and supply, and that no dimmer (PWM) is in its line.",
+            )
+
+
+def _drift(share: Doubles, alive: Flags) -> Doubles:
+    """Return by which share each lamp, (light,), gives more in the last third of the rounds than in the first, beside
+    what the others do: ``share`` (round, light) is of its usual light."""
+    third = max(len(share) // 3, 1)
+    grown = np.median(share[-third:], axis=0) / np.maximum(np.median(share[:third], axis=0), 1e-9)
+    common = float(np.median(grown[alive])) if alive.any() else 1.0
+    return np.asarray(grown / max(common, 1e-9) - 1)
+
+
+def _drifting(light: str, by: float) -> Judgement:
+    """Say that a lamp grows or fades in the course of a take, while the others stay."""
+    return Judgement(
+        subject="lights",
+        grade="doubtful",
+        found=f"The light {light!r} {'grows' if by > 0 else 'fades'} by {100 * abs(by):.0f} % in the course of the "
+        "take, beside the others: it warms up, or its battery runs down. The rig's strengths hold for a part of it.",
+        advice="Let lamps flash for some minutes before a take, and feed them from a supply that holds its voltage.",
+    )
+
+
+def _together(level: Doubles, still: Flags) -> bool:
+    """Return whether lamps change together, as under another gain of the camera, and not each for itself: ``level``
+    (round, light) is what each gives of its usual light, ``still`` (round - 1,) between which rounds nothing moves."""
+    steps = np.diff(level, axis=0)[still]
+    each, mean = (steps**2).mean(), (steps.mean(axis=1) ** 2).mean()
+    apart = 1 / level.shape[1]
+    return bool(mean > (apart + (1 - apart) * ALIKE) * each)
+
+
+def swings(swing: Swing) -> Judgement:
+    """Return the line on light that grows and shrinks, whoever's doing it is."""
+    subject = "lights" if swing.cause == "lamps" else "gain"
+    return Judgement(subject=subject, grade="doubtful", found=swing.found, advice=swing.advice)
