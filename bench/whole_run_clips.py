@@ -52,16 +52,18 @@ ENCODERS: dict[str, tuple[str, str, dict[str, str]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class ClipOf:
-    """One clip: the kind of its files, how many lights flash in a round beside the dark slot, and whether it moves."""
+    """One clip: the kind of its files, how many lights flash in a round beside the dark slot, and whether its subject
+    moves, or everything."""
 
     kind: Kind
     lights: int
     moving: bool
+    everything: bool = False
 
     @property
     def name(self) -> str:
         """What a row is called, and chosen by."""
-        return f"{self.kind} {self.lights} {'moving' if self.moving else 'still'}"
+        return f"{self.kind} {self.lights} {'everything' if self.everything else 'moving' if self.moving else 'still'}"
 
     @property
     def plan(self) -> Plan:
@@ -113,7 +115,8 @@ def _exposed(clip: ClipOf, frames: int) -> Iterator[Image]:
 
 
 def _scene(clip: ClipOf) -> Callable[[TrueFlash], Image | None]:
-    """A textured relief, its middle half going sideways where the clip moves."""
+    """A textured relief, its middle half going sideways where the clip moves, or all of it."""
+    subject = slice(None) if clip.everything else SUBJECT
     y, x = np.mgrid[0:ROWS, 0:COLS].astype(np.float32) / 240
     normals = np.stack([0.4 * np.sin(9 * x), 0.4 * np.cos(7 * y), np.ones_like(x)], -1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -129,7 +132,7 @@ def _scene(clip: ClipOf) -> Callable[[TrueFlash], Image | None]:
         if image is None or not clip.moving:
             return image
         moved = image.copy()
-        moved[:, SUBJECT] = np.roll(image[:, SUBJECT], SPEED_PX * flash.index, axis=1)
+        moved[:, subject] = np.roll(image[:, subject], SPEED_PX * flash.index, axis=1)
         return moved
 
     return plate
