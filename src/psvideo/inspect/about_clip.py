@@ -19,7 +19,7 @@ from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, 
 from psvideo.model.rows.clipping import SATURATED
 from psvideo.model.units import counted, listed
 from psvideo.report.judge.of_saturation import hidden_saturation
-from psvideo.report.observe.hidden_level import may_hide, numbers_to_look_at
+from psvideo.report.observe.hidden_level import may_hide, numbers_to_look_at, rising_samples
 
 MANY = 3
 SATURATED_SHARE = 0.01
@@ -85,7 +85,7 @@ def _findings(clip: Clip) -> Iterator[Finding]:
     yield from _level_findings(clip)
     if may_hide(clip):
         some = read_frames(clip, numbers_to_look_at(clip, clip.numbers))
-        if saturation := hidden_saturation([frame.image for frame in some], clip):
+        if saturation := hidden_saturation([rising_samples(frame.image) for frame in some], clip):
             yield warn(saturation.sentence)
 
 

@@ -15,9 +15,10 @@ BRIGHTEST = 0.999
 """Of a frame's samples, this share is darker than its brightest parts."""
 
 
-def hidden_saturation(frames: Sequence[NDArray[np.float32]], clip: Clip) -> Judgement | None:
-    """Judge whether frames, linear light by the clip's plan, end at one level below its saturation; None where not."""
-    if not (level := hidden_level(frames, clip)):
+def hidden_saturation(thin: Sequence[NDArray[np.float32]], clip: Clip) -> Judgement | None:
+    """Judge whether frames, of each its ``rising_samples``, end at one level below the plan's saturation; None where
+    not."""
+    if not (level := hidden_level(thin, clip)):
         return None
     largest = 2 ** (clip.header.bits or 0) - 1
     code = int(largest * _signal(clip.plan.camera.encoding.transfer, level.dimmest))
@@ -31,10 +32,14 @@ def hidden_saturation(frames: Sequence[NDArray[np.float32]], clip: Clip) -> Judg
     )
 
 
-def below_black(frames: Sequence[NDArray[np.float32]], clip: Clip) -> Judgement | None:
-    """Judge whether frames, linear light by the clip's plan, lie below the curve's black, also where they are lit; None
-    where not. Noise of a black picture lies on both sides of it."""
-    top = max((float(np.nanquantile(frame, BRIGHTEST)) for frame in frames), default=0.0)
+def brightest(frame: NDArray[np.float32]) -> float:
+    """Return how bright the brightest parts of a frame are, linear light by the clip's plan."""
+    return float(np.nanquantile(frame, BRIGHTEST))
+
+
+def below_black(top: float, clip: Clip) -> Judgement | None:
+    """Judge whether frames, the ``brightest`` parts of which reach ``top``, lie below the curve's black, also where
+    they are lit; None where not. Noise of a black picture lies on both sides of it."""
     if top >= 0:
         return None
     encoding, bits = clip.plan.camera.encoding, clip.header.bits or 0

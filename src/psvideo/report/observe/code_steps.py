@@ -1,6 +1,6 @@
 """How far apart the levels lie that a picture's files can hold, where its subject is."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ STEP = 2
 """Every second row and column is looked at."""
 
 
-def code_step(frames: Sequence[NDArray[np.float32]]) -> float | None:
+def code_step(frames: Iterable[NDArray[np.float32]]) -> float | None:
     """Return by which share of its light one step of the files' levels changes the subject's, by the frame in which
     that is least; ``frames`` are linear light, (row, col[, channel]). None where levels are too fine to be told apart,
     or too few."""
-    found = [step for frame in frames if (step := _step(frame)) is not None]
-    return min(found, default=None)
+    found = map(_step, frames)  # which holds none while the next one is made
+    return min((step for step in found if step is not None), default=None)
 
 
 def _step(frame: NDArray[np.float32]) -> float | None:

@@ -73,9 +73,8 @@ def numbers_to_look_at(clip: Clip, numbers: Sequence[int]) -> tuple[int, ...]:
     return tuple(numbers[first : first + count])
 
 
-def hidden_level(frames: Sequence[NDArray[np.float32]], clip: Clip) -> HiddenLevel | None:
-    """Return the level at which frames, linear light by the clip's plan, end below saturation; None where not."""
-    thin = [np.sort(_thinned(frame).ravel()) for frame in frames]
+def hidden_level(thin: Sequence[NDArray[np.float32]], clip: Clip) -> HiddenLevel | None:
+    """Return the level at which frames, of each its ``rising_samples``, end below saturation; None where not."""
     top = max((float(one[int(0.999 * one.size)]) for one in thin), default=0.0)
     places = np.linspace(1 - OVERSHOOT, 1, 16) * top
     level = max(places, key=lambda place: sum(_heaped(one, place)[1] - _heaped(one, place)[0] for one in thin))
@@ -88,11 +87,12 @@ def hidden_level(frames: Sequence[NDArray[np.float32]], clip: Clip) -> HiddenLev
     return HiddenLevel(dimmest=min(heap.dimmest for heap in heaps), share=max(heap.share for heap in heaps))
 
 
-def _thinned(frame: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a frame's samples, by their brightest channel, as many as are looked at."""
+def rising_samples(frame: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return some samples of a frame, linear light by the clip's plan, in rising order: as many as are looked at, by
+    their brightest channel."""
     step = max(round((frame.shape[0] * frame.shape[1] / SAMPLES) ** 0.5), 1)
     some = np.nan_to_num(frame[::step, ::step], nan=0.0)
-    return np.asarray(some.max(axis=-1) if some.ndim == 3 else some)
+    return np.sort((some.max(axis=-1) if some.ndim == 3 else some).ravel())
 
 
 def _heaped(rising: NDArray[np.float32], level: float) -> tuple[int, int, int]:

@@ -20,7 +20,7 @@ from psvideo.compute.progress import Watch
 from psvideo.model.arrays import Image, Pixels
 from psvideo.model.choices import Codec, Preview
 from psvideo.model.quantities import QUANTITIES
-from psvideo.pictures.on_screen import exposure_for, smaller, srgb
+from psvideo.pictures.on_screen import exposure_for, smaller_by_rows, srgb
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relit_kernel import shown_by
 from psvideo.runs.delivery.relit import TURN_S, WIDTH_PX, read_relit
@@ -122,4 +122,5 @@ def _named(picture: Pixels, name: str) -> Pixels:
 
 
 def _read(path: Path, width_px: int) -> Image:
-    return smaller(np.asarray(exr.decode(path).codes, np.float32), width_px)
+    codes = exr.decode(path).codes
+    return smaller_by_rows(lambda first, last: np.asarray(codes[first:last], np.float32), codes.shape, width_px)

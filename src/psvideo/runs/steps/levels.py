@@ -16,4 +16,5 @@ def levels_of(take: Take) -> Judgement | None:
         return None
     each = 1 if take.clip.is_movie else max(len(take.numbers) // LOOKED_AT, 1)
     numbers = take.numbers[: each * LOOKED_AT : each]
-    return coarse_steps(code_step([frame.image for frame in read_frames(take.clip, numbers, kept=take.kept)]))
+    frames = read_frames(take.clip, numbers, kept=take.kept)
+    return coarse_steps(code_step(frame.image for frame in frames))  # in light, one is held at a time

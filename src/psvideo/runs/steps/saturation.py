@@ -1,17 +1,24 @@
 """Some of a take's frames, looked at for light that the plan misreads: clipped unseen, or below black."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from psvideo.clip import Take, read_frames
-from psvideo.report.judge.of_saturation import below_black, hidden_saturation
+from psvideo.report.judge.of_saturation import below_black, brightest, hidden_saturation
 from psvideo.report.judgement import Judgement
-from psvideo.report.observe.hidden_level import may_hide, may_lie_below, numbers_to_look_at
+from psvideo.report.observe.hidden_level import may_hide, may_lie_below, numbers_to_look_at, rising_samples
 
 
 def saturation_of(take: Take) -> Judgement | None:
     """Judge whether a take's sensor saturates at a level that its plan does not name, or all of its light lies below
-    black; None where neither shows."""
-    if not (may_lie_below(take.clip) or may_hide(take.clip)):
+    black; None where neither shows. One frame in light is held at a time."""
+    clip, tops, thin = take.clip, list[float](), list[NDArray[np.float32]]()
+    if not (may_lie_below(clip) or may_hide(clip)):
         return None
-    numbers = numbers_to_look_at(take.clip, take.numbers)
-    frames = [frame.image for frame in read_frames(take.clip, numbers, kept=take.kept)]
-    below = below_black(frames, take.clip) if may_lie_below(take.clip) else None
-    return below or (hidden_saturation(frames, take.clip) if may_hide(take.clip) else None)
+    for frame in read_frames(clip, numbers_to_look_at(clip, take.numbers), kept=take.kept):
+        image = frame.image
+        tops.append(brightest(image) if may_lie_below(clip) else 0.0)
+        thin.append(rising_samples(image))
+        del frame, image
+    below = below_black(max(tops, default=0.0), clip) if may_lie_below(clip) else None
+    return below or (hidden_saturation(thin, clip) if may_hide(clip) else None)
