@@ -71,7 +71,8 @@ class Coded:
         for col in range(gain.shape[1]):
             own = light[:, col :: gain.shape[1]]
             off, scale = (plane[:, col].reshape(-1, *(1,) * (own.ndim - 1)) for plane in (zero, gain))
-            own[:] = (own - off) * scale
+            own -= off  # in place: a frame in light is large
+            own *= scale
         return light
 
 
