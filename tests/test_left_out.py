@@ -72,3 +72,21 @@ def test_lights_in_a_plane_make_no_normal() -> None:
 
 def test_where_nothing_is_left_out_nothing_is_better() -> None:
     assert not asked(tuple(range(COUNT)), 0.1).any()
+
+
+@pytest.mark.parametrize(("by_chance", "left"), [(False, True), (True, False)])
+def test_lights_that_seem_sure_by_chance_make_normals_of_no_surface_and_leave_none_out(
+    by_chance: bool, left: bool
+) -> None:
+    shape, rng = (24, 32), np.random.default_rng(4)
+    turn = rng.permuted(np.tile(np.arange(COUNT)[:, None, None], (1, *shape)), axis=0) if by_chance else None
+    places = np.arange(COUNT)[:, None, None] if turn is None else turn
+    used = np.broadcast_to(np.isin(places, AROUND), (COUNT, *shape))
+    codes = np.rint(np.where(used & by_chance, CODE + rng.normal(0, 12, used.shape), CODE)).astype(np.uint8)
+    off = np.where(used, 0, 0.08).astype(np.float32)
+    lights = [
+        AtInstant(shows=InstantSketch(codes=shown, white=WHITE, noise=1.0), unsure=one, share=SHARE)
+        for shown, one in zip(codes, off, strict=True)
+    ]
+    better = better_without(lamps(), lights, used)
+    assert (better == left).mean() > 0.95
