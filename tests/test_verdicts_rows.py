@@ -72,6 +72,15 @@ def test_check_and_the_whole_run_say_the_same_of_rows_that_come_from_other_round
     assert f"about {100 * (1 - seen / len(places)):.0f} % of a round's rows" in said[0]
 
 
+def test_what_to_do_about_missing_frames_fits_movies_too() -> None:
+    """A phone's movie of a variable frame rate was to be copied again from a faster card."""
+    timing = timing_of(dropped_frames=(DroppedFrames(after=3, count=1),))
+    lines = of_rows.coverage(plan_of(["a"], mode="rolling", dark_s=0.01), timing, GOOD.observed(0))
+    (line,) = (one for one in lines if one.subject == "frames")
+    assert "constant frame rate" in line.advice
+    assert line.advice.startswith("Of numbered files, copy")
+
+
 def test_rows_whose_ambient_light_no_part_of_a_flash_tells_are_not_laid_to_the_shutter() -> None:
     plan, one = plan_of(["a"], mode="rolling", dark_s=0.01), Footage(unseen=0.1).observed(0)
     (said,) = of_rows.coverage(plan, timing_of(), one)

@@ -152,7 +152,8 @@ def _dropped(timing: Timing, observed: Observed, *, alone: bool) -> Iterator[Jud
             found=f"{counted(missing, 'frame')} {'is' if missing == 1 else 'are'} missing ({where}); the rows "
             "there are not valid"
             + (f", which spoils {len(spoilt)} of {len(observed.facts)} rounds." if grave else "."),
-            advice="Use a faster card or a lower data rate, and copy the take again before shooting it again.",
+            advice="Of numbered files, copy the take again first. Else use a faster card or a lower data rate; with a "
+            "phone, an app that records at a constant frame rate.",
         )
     if again:
         yield Judgement(
