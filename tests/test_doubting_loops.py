@@ -154,7 +154,7 @@ def torn_in_numpy(points: ThinSurface) -> np.ndarray:
 
 
 def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
-    def of(misfit_deg: np.ndarray, torn_deg: np.ndarray) -> np.ndarray:
+    def of(misfit_deg: np.ndarray, torn_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         counts = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
         misfit = counts * misfit_deg ** (1 + how.misfit_power)
         misfit /= misfit_deg + how.little_deg
@@ -162,11 +162,13 @@ def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
         both = np.hypot(np.hypot(misfit, how.indirect * signs.indirect_deg), signs.unchecked_deg)
         most_torn = how.torn_beside * both + how.torn_alone_deg + signs.unchecked_deg
         limited = np.minimum(torn_deg, most_torn)
-        return np.asarray(both + how.torn * np.maximum(limited, signs.torn_share * torn_deg))
+        more = np.maximum(signs.by_slope_deg**2 - misfit**2, 0)
+        return np.asarray(both + how.torn * np.maximum(limited, signs.torn_share * torn_deg)), more
 
-    sure, likely = of(signs.misfit_deg, signs.torn_deg), of(signs.likely_misfit_deg, signs.likely_torn_deg)
-    least = np.maximum(likely, how.by_model * signs.by_model_deg)
-    return np.asarray(np.sqrt(np.maximum(sure**2 + signs.lost_deg**2, least**2 - signs.noise_deg**2)))
+    sure, more = of(signs.misfit_deg, signs.torn_deg)
+    likely, likely_more = of(signs.likely_misfit_deg, signs.likely_torn_deg)
+    least = np.maximum(likely**2 + likely_more, (how.by_model * signs.by_model_deg) ** 2)
+    return np.asarray(np.sqrt(np.maximum(sure**2 + more + signs.lost_deg**2, least - signs.noise_deg**2)))
 
 
 @pytest.mark.parametrize(("lights", "robust", "moving"), [(4, False, False), (8, False, True), (6, True, False)])
@@ -184,7 +186,8 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
         for unchecked in (0.0, np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)):
             counted, share = 3 * unchecked, np.asarray(unchecked, np.float32) / np.float32(9)
             signs, of_numpy = (
-                replace(each, unchecked_deg=unchecked, by_model_deg=counted, torn_share=share) for each in (found, true)
+                replace(each, unchecked_deg=unchecked, by_model_deg=counted, torn_share=share, by_slope_deg=unchecked)
+                for each in (found, true)
             )
             claimed, expected = doubt_deg(signs, how=how), doubt_in_numpy(of_numpy, how)
             assert claimed == pytest.approx(expected, rel=2e-3, abs=5e-3)

@@ -65,7 +65,9 @@ def solved(shade: Callable[[Array, Array], Array], noise: float = 0.001) -> tupl
 
 
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out what the model says, and what albedo shows that goes with the slope, which would count as well."""
     monkeypatch.setattr(signs, "turned_by_model_deg", lambda *_: None)
+    monkeypatch.setattr(signs, "by_slope_deg", lambda *_: np.float32(0))
 
 
 def test_a_sheen_under_four_lights_is_counted_in_what_normals_may_be_off_by(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,7 +88,9 @@ def test_a_sheen_under_four_lights_is_counted_in_what_normals_may_be_off_by(monk
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.01, 0.02])
-def test_noise_of_a_matte_subject_passes_for_no_model(noise: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_noise_of_a_matte_subject_passes_for_no_model_and_no_slope(
+    noise: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     found, _ = solved(matte, noise)
     without_model(monkeypatch)
     before, _ = solved(matte, noise)

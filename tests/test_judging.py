@@ -288,19 +288,18 @@ def test_a_ball_that_a_wide_lens_sees_aside_of_its_axis_is_one_surface() -> None
     assert np.median(torn_deg) < 0.1
 
 
-def test_waves_that_shine_are_off_by_no_more_than_twice_what_three_lights_claim_and_are_trusted_as_before() -> None:
-    case = shot(*shapes()[1][1:], ring(3, 40), gloss=0.15)  # off by 6 degrees, and nothing shows but that they are torn
+def test_waves_that_shine_are_off_by_no_more_than_twice_what_three_lights_claim_and_are_not_trusted() -> None:
+    case = shot(*shapes()[1][1:], ring(3, 40), gloss=0.15)  # off by 6 degrees, and nothing is left over
     solving = Solving(error=True)
     surface = solving.solve(case.plates, case.lit, mask=case.mask)
     by_signs = judged_by_signs(*solving.measured(case.plates, case.lit, mask=case.mask))
     assert surface.error_deg is not None
-    assert by_signs.error_deg is not None
     off_deg = angles_deg(surface.normals[case.mask], case.truth[case.mask])
-    assert (off_deg <= 2 * by_signs.error_deg[case.mask]).mean() < 0.5, "what shows is too little"
     claimed_deg = surface.error_deg[case.mask].astype(float)
     assert (off_deg <= 2 * claimed_deg).mean() >= 0.9
     assert np.median(claimed_deg) < 2 * np.median(off_deg)
-    assert np.array_equal(surface.valid, by_signs.valid)
+    assert np.array_equal(surface.valid, by_signs.valid), "what is usual of surfaces counts in errors alone"
+    assert (off_deg[surface.valid[case.mask]] > 10).sum() < 0.003 * case.mask.sum(), "of all were 0.1 and more"
 
 
 @pytest.mark.parametrize("shape", [1, 2])
@@ -324,7 +323,7 @@ def test_errors_count_what_cannot_be_checked_under_three_lights_alone(lights: in
     _, _, by_signs = judged(ring(lights, 30), unchecked=False)
     _, _, claimed = judged(ring(lights, 30))
     if lights == 3:
-        assert (claimed > by_signs + 2).all()
+        assert (claimed > by_signs + 1).all()
     else:
         assert np.array_equal(claimed, by_signs)
 
@@ -357,7 +356,7 @@ def test_errors_count_more_where_four_lights_check_each_other_less() -> None:
 def test_flatter_lights_leave_more_unchecked() -> None:
     facing = np.array([0, 0, 1], np.float32).reshape(3, 1, 1)
     left_deg = [float(unchecked_deg(facing, ring(3, slant))[0, 0]) for slant in (50, 30, 15)]
-    assert 2 < left_deg[0] < left_deg[1] < left_deg[2] < 12
+    assert 1 < left_deg[0] < left_deg[1] < left_deg[2] < 12
 
 
 def gentle(noise_deg: float, *, curved: float = 0.25, mirrored: bool = False) -> Surface:

@@ -67,7 +67,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
                 np.broadcast_to(np.float32(one), signs.misfit_deg.shape)
                 for one in (
                     *(signs.uneven, signs.unchecked_deg),
-                    *(np.float32(how.by_model) * signs.by_model_deg, signs.torn_share),
+                    *(np.float32(how.by_model) * signs.by_model_deg, signs.torn_share, signs.by_slope_deg),
                 )
             ),
         ]

@@ -205,7 +205,8 @@ def fill_doubt(signs: Floats, factors: Floats, out: Floats) -> None:
 
     signs: (sign, point) in degrees, a misfit and what is torn, both surely and likely; light from around; what noise
     makes more where few lights reach; what noise makes; which share of the misfit is uneven; what cannot be checked;
-    what the whole error is at least; by how much of themselves torn normals count whatever else shows.
+    what the whole error is at least; by how much of themselves torn normals count whatever else shows; what albedo
+    shows that goes with the slope, which is another sign of a misfit, and counts where it is more.
     factors: how much a misfit counts, for few lights as well; its power beyond 1; what is little of it; how much light
     from around counts, what is torn, and that at most, beside the rest and alone.
     """
@@ -222,11 +223,13 @@ def fill_doubt(signs: Floats, factors: Floats, out: Floats) -> None:
             shows, likely_shows = shows ** (ONE + power), likely_shows ** (ONE + power)
         sure = _turned(signs[0, i], times * shows, little, signs[7, i], turned)
         likely = _turned(signs[2, i], times * likely_shows, little, signs[7, i], turned)
+        by_slope = signs[11, i] * signs[11, i] + turned * turned
+        more, likely_more = max(by_slope - sure * sure, ZERO), max(by_slope - likely * likely, ZERO)
         sure += torn * max(min(signs[1, i], beside * sure + most), signs[10, i] * signs[1, i])
         likely += torn * max(min(signs[3, i], beside * likely + most), signs[10, i] * signs[3, i])
         lost, noise = signs[5, i], signs[6, i]
-        least = max(likely, signs[9, i])
-        out[i] = np.sqrt(max(sure * sure + lost * lost, least * least - noise * noise))
+        least = max(likely * likely + likely_more, signs[9, i] * signs[9, i])
+        out[i] = np.sqrt(max(sure * sure + more + lost * lost, least - noise * noise))
 
 
 @FUSED.inlined

@@ -3,7 +3,8 @@
 These signs are looked for on a coarse grid, and around every pixel, since they are smooth where noise is not. What the
 lights leave unexplained says how far the model is from the surface. Light that shows where a lamp does not reach came
 by way of other surfaces, which light everything alike and leave no residual. And normals that belong to no surface are
-wrong whatever the lights say of them (``torn.py``).
+wrong whatever the lights say of them (``torn.py``). Where lights can hardly be held against each other, albedo that
+goes with the slope shows what turns normals (``by_slope.py``).
 """
 
 import math
@@ -17,11 +18,12 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
-from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, FEW_LIGHTS, torn_share, turned_unseen
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, FEW_LIGHTS, torn_share, turned_unseen, unseen_share
 
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
@@ -32,7 +34,7 @@ UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
 up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
 ENOUGH_LIGHTS = 12
 """What ``hidden`` is measured by: this many lights hide little of what is not matte."""
-TELLING, TELLING_OF_FOUR, HIDDEN_POWER, MOST_HIDDEN = 2.6, 16.0, 0.8, 2.0
+TELLING, TELLING_OF_FOUR, HIDDEN_POWER, MOST_HIDDEN = 2.6, 24.0, 0.8, 2.0
 """How far lights hide what is not matte beside sets of lights that turn normals unseen (``turned_unseen``) so many
 times, five and six of them or four, with this power of it, and up to so much more. Over 490 sets of 4 to 8
 lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go with that measure to the powers 0.4
@@ -55,7 +57,8 @@ class Signs:
     surfaces, though nothing shows; it counts in errors, and not in what is trusted. ``torn_share``: by how much
     of themselves torn normals count whatever else shows, under lights that can hardly be held against each other.
     ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals under four and five
-    lights (``few_checked.py``)."""
+    lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
+    shows it, under lights that can hardly be held against each other (``by_slope.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -70,6 +73,7 @@ class Signs:
     unchecked_deg: Floats | float = 0.0
     by_model_deg: Floats | float = 0.0
     torn_share: Floats | float = 0.0
+    by_slope_deg: Floats | float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
@@ -99,6 +103,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
+    unseen = unseen_share(one.lit)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -113,6 +118,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
         torn_share=torn_share(points, one.lit),
+        by_slope_deg=np.float32(unseen) * by_slope_deg(points, one.lit, still) if unseen else 0.0,
     )
 
 

@@ -1,0 +1,196 @@
+"""Albedo that goes with the slope: paint does not, it differs from place to place.
+
+Three lights leave nothing over, whatever the surface does. But what turns a normal makes it longer or shorter as well:
+a sheen, clay, a highlight, light that every lamp adds, a lamp of another strength. So the albedo of a surface that is
+not what the lights take it for differs with the slope. (G. Alldrin, S. Mallick and D. Kriegman, "Resolving the
+generalized bas-relief ambiguity by entropy minimization", CVPR 2007: normals are right where albedo is most alike.)
+
+How albedo differs between neighbours is fitted by how smooth functions of their normals do. Edges of paint are
+outliers. Only what the white squares of a chess board over the subject tell of the black ones counts: the rest goes
+with the slope by chance. By how much albedo goes with the slope, and how the lights spread what is off along the normal
+and across it, says by how much normals are turned.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.ranks import median
+from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred
+
+AVERAGED = 5
+"""Normals and albedo are means over squares of so many points, and neighbours are so far apart: what noise does to both
+at once would pass for albedo that goes with the slope."""
+MOST_PAIRS, LEAST_PAIRS = 4000, 300
+"""So many pairs are fitted, evenly over the subject, and at least the second number."""
+IN_LIGHT, LEAST_BRIGHT = 0.2, 0.05
+"""A point speaks where every light shines on it by at least this share of the mean, and where it is not darker than the
+second share of what is typical: in shadow there is no albedo."""
+EVEN = 2.0
+"""Squares in which albedo varies by more than so many times what is typical hold an edge of paint, and do not speak."""
+POWERS = (30.0, 120.0)
+"""Highlights half way between a light and the camera are so narrow, as powers of the cosine."""
+TURNS, RIDGE = 5, 1e-4
+"""Cauchy's weights are found in so many turns; numbers that hardly show stay near 0."""
+SQUARES = 0.15
+"""The chess board's squares have this share of the subject's size."""
+MOST_OUTLYING = 3.0
+"""Where nothing was fitted, functions run away: beyond this many times their root mean square they count no more."""
+OF_PLACE = 0.5
+"""What goes with the slope as it goes with the place may be a lens that darkens its corners: it counts by so much."""
+OF_NOISE = 0.15
+"""By so much of what noise does to normals of a matte ball their albedo goes with the slope all the same."""
+TYPICAL_OF_MEDIAN = 1.48
+TURNS_MORE, LARGEST_DEG = 1.5, 30.0
+"""Normals are turned by so many times what albedo shows of it, since a part of it shows in no length; what that says by
+as many degrees as the second number counts half, and nothing counts more: such lengths are a highlight's."""
+
+
+class _Pairs(NamedTuple):
+    """Neighbours: how the logarithm of albedo differs (pair,), how functions of the normal do (pair, function), these
+    at the first of each (pair, function), where that is, in rows and columns over the subject's size (pair, 2)."""
+
+    differs: Doubles
+    changes: Doubles
+    here: Doubles
+    place: Doubles
+
+
+def by_slope_deg(points: ThinSurface, lit: Illumination, known: Mask) -> Floats:
+    """Return by how many degrees normals are turned, as far as albedo that goes with the slope shows it, (row, col) of
+    the points, of which these ``known`` speak for the subject; zeros where too few of them are in the light of all
+    lamps."""
+    normals, albedo, whole = _averaged(points, known)
+    bright = _bright(normals, albedo, lit, whole)
+    pairs = _pairs_of(normals, albedo, lit, bright)
+    if pairs is None:
+        return np.zeros(known.shape, np.float32)
+    shown = np.float32(TURNS_MORE * np.degrees(_goes_with_slope(pairs))) * _turned_beside_stretched(points, lit, bright)
+    shown = np.sqrt(np.maximum(shown**2 - (np.float32(OF_NOISE) * points.noise_deg) ** 2, 0))
+    return np.asarray(shown / (1 + shown / np.float32(LARGEST_DEG)), np.float32)
+
+
+def _averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
+    """Return normals (3, row, col) and albedo (row, col) of means over squares, and which squares are known as a whole
+    and hold no edge of paint."""
+    each = points.brightness * known
+    means = np.stack([blurred(plane, AVERAGED) for plane in points.planes * each])
+    sizes, albedo = np.sqrt((means**2).sum(axis=0)), blurred(each, AVERAGED)
+    whole = known & (blurred(known.astype(np.float32), AVERAGED) > np.float32(0.999)) & (sizes > 0)
+    varies = np.sqrt(np.maximum(blurred(each * each, AVERAGED) - albedo * albedo, 0))
+    varies /= np.maximum(albedo, np.float32(1e-12))
+    if whole.any():
+        whole &= varies <= np.float32(EVEN) * median(varies[whole])
+    return means / np.maximum(sizes, np.float32(1e-12)), albedo, whole
+
+
+def _pairs_of(normals: Floats, albedo: Floats, lit: Illumination, bright: Mask) -> _Pairs | None:
+    """Return neighbours in the light of all lamps, None where there are too few."""
+    cols = bright.shape[1]
+    over, beside = (np.flatnonzero(both) for both in _both(bright))
+    first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
+    if len(first) < LEAST_PAIRS:
+        return None
+    chosen = np.unique(np.linspace(0, len(first) - 1, MOST_PAIRS).astype(np.intp))
+    first, second = first[chosen], second[chosen]
+    ways = normals.reshape(3, -1).astype(np.float64)
+    here, there = (_functions(ways[:, at].T, lit.directions) for at in (first, second))
+    ones = np.log(albedo.reshape(-1)[np.stack([first, second])].astype(np.float64))
+    place = np.stack(np.divmod(first, cols), axis=-1) / np.sqrt(np.count_nonzero(bright))
+    return _Pairs(differs=ones[1] - ones[0], changes=there - here, here=here, place=place)
+
+
+def _bright(normals: Floats, albedo: Floats, lit: Illumination, known: Mask) -> Mask:
+    """Return where of what is ``known`` all lights shine on a surface that is not black, (row, col)."""
+    cosines = np.tensordot(lit.directions.astype(np.float32), normals, axes=1)
+    mean = np.maximum(cosines, 0).mean(axis=0)
+    known = known & (cosines.min(axis=0) > np.float32(IN_LIGHT) * mean)
+    if not known.any():
+        return np.asarray(known)
+    return np.asarray(known & (albedo > LEAST_BRIGHT * median(albedo[known])))
+
+
+def _both(bright: Mask) -> tuple[Mask, Mask]:
+    """Return where a point and its neighbour below, and that to the right, are bright."""
+    below, beside = np.zeros_like(bright), np.zeros_like(bright)
+    below[:-AVERAGED] = bright[:-AVERAGED] & bright[AVERAGED:]
+    beside[:, :-AVERAGED] = bright[:, :-AVERAGED] & bright[:, AVERAGED:]
+    return below, beside
+
+
+def _functions(normals: Doubles, directions: NDArray[np.floating]) -> Doubles:
+    """Return smooth functions of normals (point, 3): spherical harmonics up to the third order, and highlights of all
+    lights (light, 3), (point, function)."""
+    x, y, z = normals.T
+    smooth = [x, y, z, x * y, y * z, x * z, x * x - y * y, 3 * z * z - 1, x * y * z, z * (x * x - y * y)]
+    smooth += [x * (x * x - 3 * y * y), y * (3 * x * x - y * y), x * (5 * z * z - 1), y * (5 * z * z - 1)]
+    smooth += [z * (5 * z * z - 3)]
+    half = directions + np.array([0, 0, 1])
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    shine = np.maximum(normals @ half.T, 0)
+    return np.concatenate([np.stack(smooth, axis=-1), *(shine**power for power in POWERS)], axis=1)
+
+
+def _goes_with_slope(pairs: _Pairs) -> float:
+    """Return by which share of itself albedo typically differs with the slope, as far as one half of the subject tells
+    it of the other."""
+    scale = np.sqrt((pairs.changes**2).mean(axis=0)) + 1e-9
+    numbers, told = _fitted(pairs, pairs.changes / scale)
+    whole = _about_median(pairs.here / scale @ numbers)
+    most = MOST_OUTLYING * float(np.sqrt((whole**2).mean()))
+    rest, of_place = _without_place(np.clip(whole, -most, most), pairs.place)
+    typical = (TYPICAL_OF_MEDIAN * median(np.abs(each)) for each in (rest, OF_PLACE * of_place))
+    return float(np.hypot(*typical) * np.sqrt(told))
+
+
+def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
+    """Return by how much each function counts in how albedo differs, and which share of what they explain functions
+    of one half of the subject explain of the other."""
+    weights = np.ones(len(changes))
+    for _ in range(TURNS):
+        numbers = _solved(changes, pairs.differs, weights)
+        left = np.abs(pairs.differs - changes @ numbers)
+        weights = 1 / (1 + (left / (TYPICAL_OF_MEDIAN * median(left) + 1e-6)) ** 2)
+    black = (pairs.place / SQUARES).astype(np.intp).sum(axis=1) % 2 == 0
+    by_other = np.empty_like(left)
+    for one in (black, ~black):
+        by_other[~one] = changes[~one] @ _solved(changes[one], pairs.differs[one], weights[one])
+    whole, other = (
+        float((weights * (pairs.differs**2 - (pairs.differs - each) ** 2)).sum())
+        for each in (changes @ numbers, by_other)
+    )
+    return numbers, min(max(other / whole, 0.0), 1.0) if whole > 0 else 0.0
+
+
+def _solved(changes: Doubles, differs: Doubles, weights: Doubles) -> Doubles:
+    weighed = changes * weights[:, None]
+    matrix = weighed.T @ changes
+    matrix[np.diag_indices(len(matrix))] += RIDGE * max(float(np.trace(matrix)) / len(matrix), 1e-9)
+    return np.asarray(np.linalg.solve(matrix, weighed.T @ differs))
+
+
+def _about_median(values: Doubles) -> Doubles:
+    return np.asarray(values - median(values))
+
+
+def _without_place(values: Doubles, place: Doubles) -> tuple[Doubles, Doubles]:
+    """Return what is left without what goes with the place (point, 2), a polynomial of second order, and that."""
+    row, col = (place - place.mean(axis=0)).T
+    terms = np.stack([np.ones_like(row), row, col, row * row, row * col, col * col], axis=-1)
+    matrix = terms.T @ terms
+    matrix[np.diag_indices(6)] += 1e-9 * len(row)
+    smooth = terms @ np.linalg.solve(matrix, terms.T @ values)
+    return np.asarray(values - smooth), _about_median(smooth)
+
+
+def _turned_beside_stretched(points: ThinSurface, lit: Illumination, bright: Mask) -> Floats:
+    """Return how many times more than along a normal, typically where all lamps shine, lights spread across every
+    normal what each is off by, (row, col), where all are off by the same share of their strengths."""
+    inverse = np.linalg.pinv(lit.directions)
+    spread = (inverse @ inverse.T).astype(np.float32)
+    along = np.einsum("irc,ij,jrc->rc", points.planes, spread, points.planes)
+    across = np.maximum(np.float32(np.trace(spread)) - along, np.float32(0))
+    return np.asarray(np.sqrt(across / median(along[bright])), np.float32)

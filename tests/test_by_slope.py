@@ -1,0 +1,118 @@
+"""Albedo that goes with the slope shows what three lights, or four that check each other badly, leave unseen."""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+from bench.accuracy_measure import Case, angles_deg
+from bench.predicted import SIZE, shapes
+from ring_and_ball import ring
+
+from psvideo.model.surface import MEASURED
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.trust.judging import looked_at
+
+Shade = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""What cosines to the light and to half way send back of an albedo of 1, (row, col)."""
+_, WAVES, INSIDE = shapes()[1]
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def patches(seed: int) -> np.ndarray:
+    """Return paint of two colours with hard edges, (row, col)."""
+    soft = cv2.GaussianBlur(np.random.default_rng(seed).normal(size=(SIZE, SIZE)), (0, 0), 6)
+    return np.where(soft > 0, 0.5, 0.3)
+
+
+def shot(
+    ways: np.ndarray, shade: Shade, *, albedo: np.ndarray | float = 0.5, lens: np.ndarray | float = 1.0,
+    strengths: tuple[float, ...] = (), noise: float = 0.002,
+) -> Case:  # fmt: skip
+    """Return waves as they are lit; ``strengths`` are what lamps truly send where the rig says 1."""
+    rng, half = np.random.default_rng(1), ways + UP
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    plates = []
+    for way, between, sent in zip(ways, half, strengths or np.ones(len(ways)), strict=True):
+        light = albedo * lens * sent * shade(np.maximum(WAVES @ way, 0), np.maximum(WAVES @ between, 0))
+        plates.append((light + rng.normal(0, noise, light.shape)).astype(np.float32))
+    lit = Illumination(directions=ways, intensities=np.ones((len(ways), 1)))
+    return Case("waves", plates, lit, WAVES, INSIDE)
+
+
+def matte(c: np.ndarray, _: np.ndarray) -> np.ndarray:
+    return c
+
+
+def sheen(c: np.ndarray, h: np.ndarray) -> np.ndarray:
+    return np.asarray(c + 0.6 * h**12)
+
+
+def everywhere(c: np.ndarray, _: np.ndarray) -> np.ndarray:
+    """The same light by every lamp, as one that nobody switched off adds."""
+    return c + 0.2
+
+
+def shown_and_true_deg(case: Case) -> tuple[float, float]:
+    """Return by how many degrees typical normals are turned, as albedo shows it, and as they are."""
+    solving = Solving(error=True)
+    solved, one, noise = solving.measured(case.plates, case.lit, mask=case.mask)
+    points, found = looked_at(solved, one, noise)
+    shown = np.broadcast_to(found.by_slope_deg, points.known.shape)[points.known]
+    return float(np.median(shown)), float(np.median(angles_deg(solved.normals, case.truth)[solved.valid]))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_paint_on_a_matte_surface_does_not_go_with_its_slope(seed: int, noise: float) -> None:
+    for albedo in (0.5, patches(seed)):
+        shown, _ = shown_and_true_deg(shot(ring(3, 35), matte, albedo=albedo, noise=noise))
+        assert shown < 1
+
+
+def test_a_lens_that_darkens_its_corners_by_a_fifth_turns_nothing() -> None:
+    row, col = (np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2) / (SIZE / 2)
+    lens = 1 - 0.1 * (row**2 + col**2)
+    assert shown_and_true_deg(shot(ring(3, 35), matte, lens=lens))[0] < 1
+
+
+@pytest.mark.parametrize(
+    ("shade", "strengths", "least"),
+    [(sheen, (), 0.4), (everywhere, (), 0.2), (matte, (0.8, 1.1, 1.1), 0.4)],
+    ids=["sheen", "light", "lamps"],
+)
+@pytest.mark.parametrize("painted", [False, True])
+def test_what_turns_normals_under_three_lights_shows_in_albedo(
+    shade: Shade, strengths: tuple[float, ...], least: float, painted: bool
+) -> None:
+    """Light that all lamps add stretches normals less than it turns them."""
+    albedo = patches(3) if painted and shade is not sheen else 0.5
+    shown, true = shown_and_true_deg(shot(ring(3, 35), shade, albedo=albedo, strengths=strengths))
+    assert true > 3
+    assert least < shown / true < 2.5
+
+
+def test_under_lights_that_check_each_other_residuals_say_it() -> None:
+    assert shown_and_true_deg(shot(ring(4, 35), sheen))[0] == 0
+    together = np.array([[0, 0.4, 1], [0.1, 0.4, 1], [0.5, 0, 1], [-0.1, -0.4, 1]])
+    together /= np.linalg.norm(together, axis=1, keepdims=True)
+    shown, true = shown_and_true_deg(shot(together, sheen))
+    assert 0.4 < shown / true < 2.5
+
+
+def test_normals_that_a_sheen_turns_are_no_longer_trusted_under_three_lights() -> None:
+    case = shot(ring(3, 35), sheen)
+    surface = Solving(error=True).solve(case.plates, case.lit, mask=case.mask)
+    off_deg = angles_deg(surface.normals, case.truth)
+    measured = surface.source == MEASURED
+    assert (off_deg > 10)[measured].mean() > 0.05
+    assert (surface.valid & (off_deg > 10)).sum() <= 0.03 * max(surface.valid.sum(), 0.2 * measured.sum())
+
+
+def test_too_few_points_in_the_light_of_all_lamps_say_nothing() -> None:
+    case = shot(ring(3, 35), sheen)
+    few = np.zeros_like(INSIDE)
+    few[10:22, 10:22] = True
+    surface, one, noise = Solving(error=True).measured(case.plates, case.lit, mask=few)
+    assert not np.any(looked_at(surface, one, noise)[1].by_slope_deg)
