@@ -24,7 +24,7 @@ from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred
 AVERAGED = 5
 """Normals and albedo are means over squares of so many points, and neighbours are so far apart: what noise does to both
 at once would pass for albedo that goes with the slope."""
-MOST_PAIRS, LEAST_PAIRS = 4000, 300
+MOST_PAIRS, LEAST_PAIRS = 2500, 300
 """So many pairs are fitted, evenly over the subject, and at least the second number."""
 IN_LIGHT, LEAST_BRIGHT = 0.2, 0.05
 """A point speaks where every light shines on it by at least this share of the mean, and where it is not darker than the
@@ -158,11 +158,17 @@ def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
     by_other = np.empty_like(left)
     for one in (black, ~black):
         by_other[~one] = changes[~one] @ _solved(changes[one], pairs.differs[one], weights[one])
-    whole, other = (
-        float((weights * (pairs.differs**2 - (pairs.differs - each) ** 2)).sum())
-        for each in (changes @ numbers, by_other)
-    )
-    return numbers, min(max(other / whole, 0.0), 1.0) if whole > 0 else 0.0
+    whole = changes @ numbers
+    most = MOST_OUTLYING * float(np.sqrt((whole**2).mean()))
+    explained = _explained(pairs.differs, whole, weights)
+    told = _explained(pairs.differs, np.clip(by_other, -most, most), weights)
+    return numbers, min(told / explained, 1.0) if explained > 0 else 0.0
+
+
+def _explained(differs: Doubles, by_slope: Doubles, weights: Doubles) -> float:
+    """Return how much of squares is explained by as many times ``by_slope`` as explain most, 0 where less than none."""
+    along = max(float((weights * differs * by_slope).sum()), 0.0)
+    return along**2 / max(float((weights * by_slope**2).sum()), 1e-30)
 
 
 def _solved(changes: Doubles, differs: Doubles, weights: Doubles) -> Doubles:

@@ -97,7 +97,8 @@ def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: J
     if len(one.plates) > ALL_EXPLAINED or error is None:
         return surface
     measured = surface.valid if surface.source is None else surface.source == MEASURED
-    points, signs = looked_at(replace(surface, valid=measured, error_deg=None, residual=None), one, noise, how=how)
+    plain = replace(surface, valid=measured, error_deg=None, residual=None)
+    points, signs = looked_at(plain, one, noise, how=how, by_slope=False)  # it is in the errors, and adds nothing here
     spread_deg = unchecked_deg(points.planes, one.lit.directions)
     unchecked = replace(signs, unchecked_deg=spread_deg, torn_share=np.ones_like(spread_deg))
     shown, whole = (doubt_deg(each, how=how.doubting) for each in (signs, unchecked))
@@ -170,13 +171,13 @@ def _typical_light(surface: Surface, one: Evidence) -> float:
 
 
 def looked_at(
-    surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()
+    surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging(), by_slope: bool = True
 ) -> tuple[ThinSurface, Signs]:
     """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
     to."""
     near = near_spread(one.lit, _thin_shape(surface, one))
     points = _Spread.of(surface, one, noise, how, near).points(surface)
-    return points, signs_of(points, one)
+    return points, signs_of(points, one, by_slope=by_slope)
 
 
 def emptied(surface: Surface) -> Surface:

@@ -83,9 +83,10 @@ class Signs:
         return replace(self, **here)
 
 
-def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None) -> Signs:
+def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None, *, by_slope: bool = True) -> Signs:
     """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
-    misfit of rig or surface. Raises ValueError where nobody looked for light from around."""
+    misfit of rig or surface; without ``by_slope`` nobody looks at albedo that goes with the slope. Raises ValueError
+    where nobody looked for light from around."""
     if one.indirect is None:
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
     lights, plain = len(one.plates), points.surface.error_deg is None
@@ -103,7 +104,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
-    unseen = unseen_share(one.lit)
+    unseen = unseen_share(one.lit) if by_slope else 0.0
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
