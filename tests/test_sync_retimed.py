@@ -320,3 +320,23 @@ def test_where_many_frames_are_missing_the_strobe_may_have_started_again(plan: P
     notes = [note for note in timing.notes if "started again may look the same" in note]
     assert len(notes) == (missing > 3)
     assert all("Behind frame 30 " in note and "7 frames" in note and "58.39 ms" in note for note in notes)
+
+
+@pytest.mark.parametrize("inserted", [True, False], ids=["inserted", "standing-in"])
+def test_copies_are_known_though_lights_are_alike_in_every_row(inserted: bool, make_plan: PlanMaker) -> None:
+    """Left and right mirror one another, so that row means tell them apart nowhere; the upper rows are in the dark. A
+    flash that begins with a frame is seen by that frame alone, and a copy of the one before looks like it."""
+    plan = make_plan(height_px=96, width_px=24, fps=Fraction(60), readout=0.72, duration_s=0.001, dark_every=2)
+    rng = np.random.default_rng(8)
+    key, left = (0.2 + 0.5 * rng.random((96, 24)).astype(np.float32) for _ in range(2))
+    plates = dict(zip(plan.lit_slots, (key, left, left[:, ::-1]), strict=True))
+    for plate in plates.values():
+        plate[:12] = 0.0
+    flash_s = plan.cycle_s / len(plan.cycle_slots)
+    clock = TrueClock(phase_s=13.001 * plan.camera.frame_period_s - 12 * flash_s, offset_ppm=12.0)
+    shot = expose(plates, plan, frames=50, clock=clock, noise=NOISE, bits=12)
+    again = np.isin(np.arange(50), (12, 24, 37))
+    frames = np.repeat(shot.frames, 1 + again, axis=0) if inserted else shot.frames[np.arange(50) - again]
+    timing = timing_from_rows(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
+    assert timing.repeated_frames == ((13, 26, 40) if inserted else (12, 24, 37))
+    assert timing.phase_error_rows < 0.01

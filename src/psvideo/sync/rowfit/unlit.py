@@ -28,6 +28,9 @@ LIT = 0.1
 """A frame is lit whose rows lie above their darkest by this share of their spreads on an average."""
 OFTEN = 0.05
 """Lit frames of which this share look alike may do so because lights are alike."""
+NOISY = 0.7
+"""Where more than this share of lit frames that look alike are the same, frames may have no noise, and lights be alike.
+"""
 LEAST_SHARE = 0.1
 """Where fewer frames than that are lit, it may be the subject that is dark."""
 
@@ -43,10 +46,20 @@ def unlit(plan: Plan, rows: Profiles) -> Mask:
 
 def lit_twins(rows: Profiles) -> Mask:
     """Return the frames that look exactly like those before them and are lit, shape (frame,): unlike two in the dark,
-    they show the same moment wherever another flash was due. None where many do, as where lights are alike."""
+    they show the same moment wherever another flash was due. Where many do, as where lights are alike, only ``copies``
+    count."""
     few = rows.binned(ROWS)
     found = twins(few) & (_above_floor(few, FLOOR * len(few.value)) > LIT)
-    return found if found.mean() < OFTEN else np.zeros_like(found)
+    return found if found.mean() < OFTEN else copies(rows)
+
+
+def copies(rows: Profiles) -> Mask:
+    """Return the lit frames that are those before them to the last bit, shape (frame,): noise makes any others differ.
+    None where nothing shows that there is noise: all that look alike are the same."""
+    few = rows.binned(ROWS)
+    alike = twins(few) & (_above_floor(few, FLOOR * len(few.value)) > LIT)
+    same = alike & np.append(False, (np.diff(rows.value, axis=0) == 0.0).all(axis=1))
+    return same if same.sum() < NOISY * alike.sum() else np.zeros_like(same)
 
 
 def _above_floor(rows: Profiles, rank: float) -> Doubles:

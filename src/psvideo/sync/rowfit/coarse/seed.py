@@ -23,6 +23,7 @@ from psvideo.sync.rowfit.coarse.search import search
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.tracking.losses import frame_losses
+from psvideo.sync.rowfit.unlit import copies
 
 SEARCH_ROWS = 36
 SEED_ROWS = 144
@@ -118,8 +119,10 @@ def other_seeds(plan: Plan, rows: Profiles, seed: Seed) -> Iterator[Seed]:
 
 def _retimed(plan: Plan, rows: Profiles, twin: Mask, reach_ppm: float) -> Iterator[Seed]:
     """Yield seeds under other numberings than the files': repeated frames left out, frames missing regularly."""
-    if twin.mean() > OFTEN:
-        for numbering in (stood_in(rows, twin), inserted(rows, twin)):
+    again = copies(rows)
+    odd = [again] if again.any() and (again != twin).any() else []
+    for mask in [*odd, twin] if twin.mean() > OFTEN else []:
+        for numbering in (stood_in(rows, mask), inserted(rows, mask)):
             yield _best(plan, rows, numbering, _stretches(plan, renumbered(rows, numbering)), reach_ppm)
     bases = (as_numbered(rows), inserted(rows, twin)) if twin.mean() > OFTEN else (as_numbered(rows),)
     length = min(fold_frames(plan, rows), len(rows.value))

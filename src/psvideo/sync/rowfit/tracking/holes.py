@@ -9,8 +9,9 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
+from psvideo.sync.rowfit.tracking.steps_ahead import due
 from psvideo.sync.rowfit.tracking.track import FrameTrack
-from psvideo.sync.rowfit.unlit import lit_twins
+from psvideo.sync.rowfit.unlit import copies, lit_twins
 
 NATURAL = 0.1
 """A frame that looks like the one before it is repeated only where its own place in time fits worse by this much."""
@@ -50,10 +51,12 @@ def with_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask) ->
     """Return the track of all frames from that of those that were ``kept`` (frame,).
 
     A frame that was left out takes the place of the one before it, unless its own place is free and fits as well: dark
-    slots that follow one another look alike, too.
+    slots that follow one another look alike, too. A copy of the frame before it is one wherever another flash was due:
+    lights may be alike in all rows but those that hold a flash's beginning.
     """
     if kept.all():
         return tracked
+    again = copies(rows)
     last = np.maximum.accumulate(np.where(kept, np.arange(len(kept)), 0))
     index = tracked.index[np.cumsum(kept) - 1]
     own = index + rows.index - rows.index[last]
@@ -64,6 +67,7 @@ def with_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask) ->
         if open_places.any():
             there, here = (_fits(plan, rows, tracked, kept, block, places) for places in (own, index))
             natural = open_places & (there < here + NATURAL)
+            natural &= ~(again[block] & due(plan, replace(rows, index=own).take(block), tracked.beat, 1))
             index[block] = np.where(natural, own[block], index[block])
     return replace(tracked, index=np.maximum.accumulate(index))
 

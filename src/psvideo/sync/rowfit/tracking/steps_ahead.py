@@ -75,7 +75,7 @@ def steps_ahead(
     beyond = block.start > 0, block.stop < len(rows.value)
     table[:, -LEAST] = losses_but_for_misfires(plan, learnt, ahead, beat, light, beyond=beyond)
     if same.lit.any():
-        same = same._replace(lit=same.lit & _due(plan, ahead, beat, sign))
+        same = same._replace(lit=same.lit & due(plan, ahead, beat, sign))
     course = _cheapest(table[::sign], same.turned(sign), sign)[::sign]
     again = _repeats_alone(course[::sign], same.turned(sign), sign)
     if course.any() and not again and not _holds(plan, rows, beat, known, block, course, sign):
@@ -84,7 +84,7 @@ def steps_ahead(
     return course[:nearer] if sign > 0 else course[-nearer:]
 
 
-def _due(plan: Plan, rows: Profiles, beat: Beat, sign: int) -> Mask:
+def due(plan: Plan, rows: Profiles, beat: Beat, sign: int) -> Mask:
     """Return which frames (frame,) were to show other flashes than the one followed before, by the plan and their
     places in time: brightnesses say little of it where the subject moves."""
     before = replace(rows, index=rows.index - sign)
@@ -92,8 +92,8 @@ def _due(plan: Plan, rows: Profiles, beat: Beat, sign: int) -> Mask:
     for light in np.eye(1 + len(plan.lit_slots))[1:]:
         own = np.tile(np.append(light, np.zeros(2 * len(beat.beat_hz))), (rows.value.shape[1], 1))
         change += np.abs(predictions(plan, rows, beat, own) - predictions(plan, before, beat, own))
-    due: Mask = change.mean(axis=1) > DUE
-    return due
+    found: Mask = change.mean(axis=1) > DUE
+    return found
 
 
 def _calm(loss: Doubles, usual: float) -> bool:
@@ -182,5 +182,5 @@ def _stood_in(twins: Twins, sign: int) -> Integers:
 def _repeats_alone(course: Integers, twins: Twins, sign: int) -> bool:
     """Return whether a course is nothing but lit frames that stand in for others."""
     steps, beside = np.diff(course, prepend=0), _stood_in(twins, sign)
-    told = np.where(twins.alike, twins.lit & (steps == -1), (steps >= 0) & (steps <= beside))
-    return bool(twins.alike.any() and told.all() and course[-1] == 0)
+    told = np.where(twins.alike & twins.lit, steps == -1, (steps >= 0) & (steps <= beside))
+    return bool(twins.lit.any() and told.all() and course[-1] == 0)
