@@ -105,6 +105,7 @@ def test_normals_that_a_sheen_turns_are_no_longer_trusted_under_three_lights() -
     case = shot(ring(3, 35), sheen)
     surface = Solving(error=True).solve(case.plates, case.lit, mask=case.mask)
     off_deg = angles_deg(surface.normals, case.truth)
+    assert surface.source is not None
     measured = surface.source == MEASURED
     assert (off_deg > 10)[measured].mean() > 0.05
     assert (surface.valid & (off_deg > 10)).sum() <= 0.03 * max(surface.valid.sum(), 0.2 * measured.sum())

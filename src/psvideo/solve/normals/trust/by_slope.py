@@ -142,8 +142,8 @@ def _goes_with_slope(pairs: _Pairs) -> float:
     whole = _about_median(pairs.here / scale @ numbers)
     most = MOST_OUTLYING * float(np.sqrt((whole**2).mean()))
     rest, of_place = _without_place(np.clip(whole, -most, most), pairs.place)
-    typical = (TYPICAL_OF_MEDIAN * median(np.abs(each)) for each in (rest, OF_PLACE * of_place))
-    return float(np.hypot(*typical) * np.sqrt(told))
+    typical, typical_of_place = (TYPICAL_OF_MEDIAN * median(np.abs(each)) for each in (rest, OF_PLACE * of_place))
+    return float(np.hypot(typical, typical_of_place) * np.sqrt(told))
 
 
 def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:

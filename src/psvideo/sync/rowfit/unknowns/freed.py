@@ -180,7 +180,7 @@ def _hidden_s(plan: Plan, rows: Profiles, fit: Fit, slow: Fit) -> float:
     likely = UNTOLD**2 * ratio / (UNTOLD**2 * ratio + 1.0 - UNTOLD**2)
     towards = (usual_s / either_s) ** 2
     moved_s = float(np.sqrt((towards * apart_s) ** 2 + towards * error_s**2))
-    return min(likely**0.5, likely / UNTOLD) * moved_s
+    return float(min(likely**0.5, likely / UNTOLD) * moved_s)
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
