@@ -104,7 +104,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
-    unseen = unseen_share(one.lit) if by_slope else 0.0
+    unseen = unseen_share(one.lit) if by_slope and turned_deg is None else 0.0  # what was not followed goes with it too
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,

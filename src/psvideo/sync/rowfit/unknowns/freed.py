@@ -36,6 +36,8 @@ SOFT = 3.0
 UNTOLD = 0.6
 """and put the times in doubt by this share of how far tails beside a blur would move them: it may be tails or none.
 Its square is how likely tails are that no plan tells, where the picture says nothing of them;"""
+SURELY = 600.0
+"""An exponent from which on tails are as sure as numbers say;"""
 USUAL_TAIL = 0.06
 """by which flashes are then moved by this share of the shortest flash, as a root mean square."""
 FARTHEST, STEPS = 0.06, 2
@@ -176,7 +178,7 @@ def _hidden_s(plan: Plan, rows: Profiles, fit: Fit, slow: Fit) -> float:
     error_s = max(_more_s(fit, slow), LEAST_MORE * slow.shift_error_s, apart_s / float(np.sqrt(max(deviances, 1.0))))
     usual_s = USUAL_TAIL * plan.shortest_flash_s
     either_s = float(np.hypot(error_s, usual_s))
-    ratio = error_s / either_s * float(np.exp(0.5 * apart_s**2 * (error_s**-2.0 - either_s**-2.0)))
+    ratio = error_s / either_s * float(np.exp(min(0.5 * apart_s**2 * (error_s**-2.0 - either_s**-2.0), SURELY)))
     likely = UNTOLD**2 * ratio / (UNTOLD**2 * ratio + 1.0 - UNTOLD**2)
     towards = (usual_s / either_s) ** 2
     moved_s = float(np.sqrt((towards * apart_s) ** 2 + towards * error_s**2))
