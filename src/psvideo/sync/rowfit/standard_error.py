@@ -65,15 +65,9 @@ def _alike(hessian: Doubles, at_place: Doubles, known: Doubles, *, unknowns: int
 def sandwich(hessian: Doubles, scores: Doubles, known: Doubles) -> Doubles:
     """Return the covariance of the unknowns, true also where frames near one another err together.
 
-    Of several estimates, each right under other correlations, the one that claims least certainty of the first unknown
-    is taken.
+    Of several estimates, each right under other correlations, the one that claims least certainty is taken.
     """
-    return filled(solved(hessian + known, np.eye(len(known))), scores)
-
-
-def filled(bread: Doubles, scores: Doubles) -> Doubles:
-    """Return the covariance from what it would be if residuals were as independent as their weights say, ``bread``
-    (unknown, unknown), and ``scores`` (frame, unknown)."""
+    bread = solved(hessian + known, np.eye(len(known)))
     filling = scores.T @ scores
     for lag in range(1, min(LAG, len(scores) - 1) + 1):
         cross = scores[lag:].T @ scores[:-lag]

@@ -10,22 +10,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import EDGES, Fit, robust_loss
-from psvideo.sync.rowfit.standard_error import filled
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 
 CLEAR = 30.0
 """Variances that a curve, or an exposure, must explain beyond what the other one does, to be needed beside it."""
 LIKELY = 9.0
-"""Variances that an exposure or a readout must explain to put times in doubt, as frames show them that err together,
-and a curve to be off still more."""
+"""Variances that an exposure or a readout must explain to put times in doubt, and a curve to be off still more."""
 SIMPLER = 5.0
 """Variances that another shape of the curve must explain to be worth its being free."""
 ROUNDS = 4
@@ -36,8 +32,6 @@ PROBE = 1e-3
 """Share of the shortest flash by which times are moved, to see what that changes."""
 FAINT = 1e-4
 """Below this share of saturation a power is not followed: its logarithm has no end."""
-STILL = 0.95
-"""A subject moves of which a fit takes away less of the robust loss."""
 SAME = 1e-10
 """Steps that differ by less than this share of themselves are the same one."""
 
@@ -115,10 +109,9 @@ def maybe_otherwise_s(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     others, beside_s = list[str](), 0.0
     if "exposure_s" not in free:
         exposed, bent, both = steps.taken([EXPOSURE]), steps.best([]), steps.best([EXPOSURE])
-        needed = steps.clear_of(EXPOSURE, steps.shapes([EXPOSURE])) > LIKELY
-        beside_s = abs(float(both.by[SHIFT] - bent.by[SHIFT])) if needed else 0.0
-        others += ["exposure_s"] if exposed.gain > bent.gain and steps.clear_of(EXPOSURE, []) > LIKELY else []
-    if "row_time_s" not in free and steps.clear_of(ROW_TIME, []) > LIKELY:
+        beside_s = abs(float(both.by[SHIFT] - bent.by[SHIFT])) if both.gain - bent.gain > LIKELY else 0.0
+        others += ["exposure_s"] if exposed.gain > max(bent.gain, steps.taken([]).gain + LIKELY) else []
+    if "row_time_s" not in free and steps.taken([ROW_TIME]).gain > steps.taken([]).gain + LIKELY:
         others.append("row_time_s")
     if not others:
         return beside_s
@@ -136,46 +129,26 @@ class _Step:
 
 @dataclass(frozen=True, kw_only=True)
 class _Steps:
-    """The normal equations of small steps from a fit, their ``pull`` (step,) also frame by frame, ``scores`` (frame,
-    step), and whether the subject is ``moving``; ``always`` are the places of those that are free anyway."""
+    """The normal equations of small steps from a fit; ``always`` are the places of those that are free anyway."""
 
     matrix: Doubles
     pull: Doubles
-    scores: Doubles
-    moving: bool
     always: tuple[int, ...]
 
     def taken(self, more: Sequence[int]) -> _Step:
         """Return the best steps of the times that are free anyway, and of ``more``."""
         kept = np.array([*self.always, *more])
-        inverse = self._inverse(kept)
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.matrix)[kept], 1e-300))
+        scale = np.outer(unit, unit)
+        inverse = np.linalg.pinv(self.matrix[np.ix_(kept, kept)] * scale, rcond=SAME, hermitian=True) * scale
         by = np.zeros(len(self.pull))
         by[kept] = inverse @ self.pull[kept]
         return _Step(gain=float(by @ self.pull), by=by, variance=float(inverse[0, 0]))
 
-    def clear_of(self, one: int, more: Sequence[int]) -> float:
-        """Return what ``one`` step explains beside ``more``, in its variances; where the subject moves, as they are
-        where neighbouring frames err together: it feigns many of those that noise alone makes."""
-        kept = np.array([one, *self.always, *more])
-        inverse = self._inverse(kept)
-        step = float(inverse[0] @ self.pull[kept])
-        alike = float(filled(inverse, self.scores[:, kept])[0, 0]) if self.moving else 0.0
-        variance = max(alike, float(inverse[0, 0]))
-        return step**2 / variance if variance > 0.0 else 0.0
-
-    def _inverse(self, kept: NDArray[np.int64]) -> Doubles:
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.matrix)[kept], 1e-300))
-        scale = np.outer(unit, unit)
-        inverse: Doubles = np.linalg.pinv(self.matrix[np.ix_(kept, kept)] * scale, rcond=SAME, hermitian=True) * scale
-        return inverse
-
     def best(self, more: Sequence[int]) -> _Step:
-        """Return the best steps with a curve as well."""
-        return self.taken([*more, *self.shapes(more)])
-
-    def shapes(self, more: Sequence[int]) -> Sequence[int]:
-        """Return the places of the fewest shapes of a curve that explain as much as others beside ``more``."""
-        return max(SETS, key=lambda shapes: self.taken([*more, *shapes]).gain - SIMPLER * len(shapes))
+        """Return the best steps with a curve as well, of the fewest shapes that explain as much."""
+        taken = [(self.taken([*more, *shapes]), len(shapes)) for shapes in SETS]
+        return max(taken, key=lambda one: one[0].gain - SIMPLER * one[1])[0]
 
 
 def _curve(steps: _Steps, *, held: bool, surely: bool) -> tuple[Curve, float]:
@@ -196,13 +169,9 @@ def _curve(steps: _Steps, *, held: bool, surely: bool) -> tuple[Curve, float]:
 
 def _steps(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> _Steps:
     trust = np.sqrt(fit.weight)
-    every = np.array([trust * one for one in _changes(plan, rows, fit, free)])
-    changes = every.reshape(len(every), -1)
+    changes = np.array([(trust * one).ravel() for one in _changes(plan, rows, fit, free)])
     always = (0, 1, *([ROW_TIME] if "row_time_s" in free else []), *range(OTHERS, len(changes)))
-    scores = -np.einsum("sfr,fr->fs", every, trust * fit.rest)
-    plain = replace(rows, restless=None)
-    moving = gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
-    return _Steps(matrix=changes @ changes.T, pull=scores.sum(axis=0), scores=scores, moving=moving, always=always)
+    return _Steps(matrix=changes @ changes.T, pull=-changes @ (trust * fit.rest).ravel(), always=always)
 
 
 def _changes(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> list[Doubles]:

@@ -8,7 +8,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, LEAST_BLUR_ROWS, Fit, clearest, robust_loss
+from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit, clearest, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, FEIGNED, blurred_s, cleared, within_blur
 
@@ -34,20 +34,11 @@ flash as it is, so that small ones change nothing to the first order. Freeing th
 SOFT = 3.0
 """Edges are soft where tails take away this much of the robust loss,"""
 UNTOLD = 0.6
-"""and put the times in doubt by this share of how far tails beside a blur would move them: it may be tails or none.
-Its square is how likely tails are that no plan tells, where the picture says nothing of them;"""
-SURELY = 600.0
-"""An exponent from which on tails are as sure as numbers say;"""
-USUAL_TAIL = 0.06
-"""by which flashes are then moved by this share of the shortest flash, as a root mean square."""
+"""and put the times in doubt by this share of how far tails beside a blur would move them: it may be tails or none."""
 FARTHEST, STEPS = 0.06, 2
 """An exposure that is off by more than a flash lasts leaves rows far from where a flash is cut unexplained, so that no
 small step finds it. It is looked for up to this share of it, in steps of the shortest flash over the second: farther
 off, it is another shutter."""
-IN_DEVIANCES = CAUCHY**2
-"""What is taken away of Cauchy's loss, in deviances (twice a log-likelihood), where residuals are those of noise."""
-LEAST_MORE = 0.5
-"""What tails would change is known no better than this share of the times' error beside them."""
 PROBED_ROWS, PROBED_FRAMES = 60, 240
 """Rows and frames that it is looked for in."""
 TAILS, BLUR = ("rise_s", "fall_s"), "blur_s"
@@ -144,7 +135,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     slow = fitted(plan, rows, fit.beat, (*free, *tails))
     gain = taken_away(plan, rows, fit, slow)
     if gain < SOFT or not _plausible(plan, slow.beat):
-        return Freed(fit=fit, unsure_s=_hidden_s(plan, rows, fit, slow) if _may_hide_tails(plan, rows, fit) else 0.0)
+        return Freed(fit=fit, unsure_s=_hidden_s(rows, fit, slow) if _may_hide_tails(plan, rows, fit) else 0.0)
     row_time_s = fit.beat.row_time_s
     if row_time_s == 0.0:
         return Freed(fit=slow if _clear(fit, slow, tails) and gain > SLOWER else fit)
@@ -166,23 +157,9 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     return Freed(fit=fit, unsure_s=doubt_s, soft_s=max(slow.beat.rise_s, slow.beat.fall_s))
 
 
-def _hidden_s(plan: Plan, rows: Profiles, fit: Fit, slow: Fit) -> float:
-    """Return by how much times are in doubt because tails that the picture does not show may be there all the same.
-
-    Either there are none, or some move flashes by about as much as is usual (a spike and a slab: Mitchell and Beauchamp
-    1988). The likelier none are, the less what some would do counts. With tails, times would be ``apart_s`` away; short
-    ones that are alike change next to nothing, so that this may be known worse than a small step's error says.
-    """
-    apart_s = rms_apart_s(rows, fit.beat, slow.beat)
-    deviances = IN_DEVIANCES * taken_away(plan, rows, fit, slow)
-    error_s = max(_more_s(fit, slow), LEAST_MORE * slow.shift_error_s, apart_s / float(np.sqrt(max(deviances, 1.0))))
-    usual_s = USUAL_TAIL * plan.shortest_flash_s
-    either_s = float(np.hypot(error_s, usual_s))
-    ratio = error_s / either_s * float(np.exp(min(0.5 * apart_s**2 * (error_s**-2.0 - either_s**-2.0), SURELY)))
-    likely = UNTOLD**2 * ratio / (UNTOLD**2 * ratio + 1.0 - UNTOLD**2)
-    towards = (usual_s / either_s) ** 2
-    moved_s = float(np.sqrt((towards * apart_s) ** 2 + towards * error_s**2))
-    return float(min(likely**0.5, likely / UNTOLD) * moved_s)
+def _hidden_s(rows: Profiles, fit: Fit, slow: Fit) -> float:
+    """Return by how much times are in doubt because tails that the picture does not show may be there all the same."""
+    return UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, slow.beat), _more_s(fit, slow)))
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
