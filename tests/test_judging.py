@@ -51,12 +51,14 @@ def judged(
     along: np.ndarray = COLOUR,
     colour: np.ndarray = COLOUR,
     unchecked: bool = True,
+    moved: bool = False,
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return a ball as solved, true errors in degrees where it was measured, and predicted ones.
 
     indirect: what of its albedo every light gives all of the ball by way of other surfaces. blotches: the standard
     deviation of soft errors, each light's own and as ``wide`` in pixels, whose channels stand to each other as
-    ``along`` says. unchecked: whether errors count what three lights cannot show of real surfaces.
+    ``along`` says. unchecked: whether errors count what three lights cannot show of real surfaces. moved: whether one
+    point of a plate may be off for motion, by next to nothing.
     """
     normals, inside = ball()
     rng = np.random.default_rng(3)
@@ -68,7 +70,10 @@ def judged(
     directions = lights if claimed is None else claimed
     lit = Illumination(directions=directions, intensities=np.ones((len(lights), 3)))
     solving = Solving(error=True)
-    solved = solving.solve(plates, lit, mask=inside)
+    unsure = np.zeros((len(lights), *inside.shape), np.float32) if moved else None
+    if unsure is not None:
+        unsure[0, 0, 0] = 1e-6
+    solved = solving.solve(plates, lit, mask=inside, unsure=unsure)
     surface = solved if unchecked else judged_by_signs(*solving.measured(plates, lit, mask=inside))
     assert surface.error_deg is not None
     measured = solved.measured & inside
@@ -328,6 +333,12 @@ def test_errors_count_what_cannot_be_checked_under_three_lights_alone(lights: in
         assert np.array_equal(claimed, by_signs)
 
 
+def test_errors_count_more_of_it_where_motion_keeps_albedo_from_showing_it() -> None:
+    _, _, by_signs = judged(ring(3, 30), unchecked=False)
+    _, _, claimed = judged(ring(3, 30), moved=True)
+    assert (claimed > by_signs + 2).all()
+
+
 def test_lights_that_stand_together_turn_normals_unseen_and_a_ring_does_not() -> None:
     def unseen(ways: np.ndarray, strengths: tuple[float, ...] = (1, 1, 1, 1)) -> float:
         rays = ways / np.linalg.norm(ways, axis=1, keepdims=True)
@@ -355,8 +366,9 @@ def test_errors_count_more_where_four_lights_check_each_other_less() -> None:
 
 def test_flatter_lights_leave_more_unchecked() -> None:
     facing = np.array([0, 0, 1], np.float32).reshape(3, 1, 1)
-    left_deg = [float(unchecked_deg(facing, ring(3, slant))[0, 0]) for slant in (50, 30, 15)]
-    assert 1 < left_deg[0] < left_deg[1] < left_deg[2] < 12
+    for beside_slope, least_deg in ((True, 1), (False, 2)):
+        left = [unchecked_deg(facing, ring(3, slant), beside_slope=beside_slope)[0, 0] for slant in (50, 30, 15)]
+        assert least_deg < left[0] < left[1] < left[2] < 12
 
 
 def gentle(noise_deg: float, *, curved: float = 0.25, mirrored: bool = False) -> Surface:

@@ -57,6 +57,11 @@ class Evidence:
     spare: Path | None = None
     grid_px: int = GRID_PX
 
+    @property
+    def moved(self) -> bool:
+        """Whether any plate may be off for motion."""
+        return self.unsure is not None and bool(self.unsure.any())
+
     def step_of(self, shape: tuple[int, ...]) -> int:
         """Return how many rows and columns of a picture lie between two points at which it is judged."""
         return max(-(-max(shape[:2]) // self.grid_px), 1)

@@ -78,8 +78,8 @@ def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) ->
 
 
 def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
-    """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3), either
-    one that shines or one that is rough, whichever is more. A model that explains LEAST_EVENLY counts nothing, one
+    """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3): one
+    that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts nothing, one
     that explains twice as much wholly: what comes and goes by its noise would flicker."""
     sizes, most, left = np.linalg.norm(g, axis=1), np.zeros(len(g)), 1.0
     typical = median(sizes)

@@ -99,7 +99,7 @@ def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: J
     measured = surface.valid if surface.source is None else surface.source == MEASURED
     plain = replace(surface, valid=measured, error_deg=None, residual=None)
     points, signs = looked_at(plain, one, noise, how=how, by_slope=False)  # it is in the errors, and adds nothing here
-    spread_deg = unchecked_deg(points.planes, one.lit.directions)
+    spread_deg = unchecked_deg(points.planes, one.lit.directions, beside_slope=not one.moved)
     unchecked = replace(signs, unchecked_deg=spread_deg, torn_share=np.ones_like(spread_deg))
     shown, whole = (doubt_deg(each, how=how.doubting) for each in (signs, unchecked))
     more = np.sqrt(np.maximum(whole * whole - shown * shown, np.float32(0)))

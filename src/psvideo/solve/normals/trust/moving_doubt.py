@@ -89,7 +89,7 @@ def moved_deg(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS)
     The errors of lights are taken as independent, and spread as least squares spreads them across the normal. Where one
     normal explains the plates of more than three lights as it explains what stands still, they are hardly off.
     """
-    if one.unsure is None or not one.unsure.any():
+    if one.unsure is None or not one.moved:
         return None
     normals = points.surface.normals.astype(np.float32)
     strength = one.lit.intensities.mean(axis=1)

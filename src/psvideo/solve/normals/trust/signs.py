@@ -34,12 +34,12 @@ UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
 up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
 ENOUGH_LIGHTS = 12
 """What ``hidden`` is measured by: this many lights hide little of what is not matte."""
-TELLING, TELLING_OF_FOUR, HIDDEN_POWER, MOST_HIDDEN = 2.6, 24.0, 0.8, 2.0
+TELLING, TELLING_OF_FOUR, FOUR_BESIDE_SLOPE, HIDDEN_POWER, MOST_HIDDEN = 2.6, 16.0, 24.0, 0.8, 2.0
 """How far lights hide what is not matte beside sets of lights that turn normals unseen (``turned_unseen``) so many
-times, five and six of them or four, with this power of it, and up to so much more. Over 490 sets of 4 to 8
-lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go with that measure to the powers 0.4
-to 0.6 (half of this one is used, ``few_power``), and not with the lights' condition number. More would
-trust less that is wrong, and claim medians that are over 1.5 times too large."""
+times, five and six of them, or four, or four where albedo by slope counts as well, with this power of it, and up to so
+much more. Over 490 sets of 4 to 8 lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go
+with that measure to the powers 0.4 to 0.6 (half of this one is used, ``few_power``), and not with the lights' condition
+number. More would trust less that is wrong, and claim medians that are over 1.5 times too large."""
 LEAST_UNREACHED = 0.02
 """Light from around is known where at least this many lights, in the mean, do not reach a point."""
 
@@ -104,7 +104,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
-    unseen = unseen_share(one.lit) if by_slope and turned_deg is None else 0.0  # what was not followed goes with it too
+    unseen = 0.0 if one.moved or not by_slope else unseen_share(one.lit)  # what was not followed goes with it too
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -115,7 +115,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         likely_torn_deg=likely_torn_deg,
         noise_deg=points.noise_deg,
         lost_deg=points.noise_deg * np.sqrt(one.indirect.wider - 1),
-        hidden=hidden_of(one.lit, plain=plain),
+        hidden=hidden_of(one.lit, plain=plain, beside_slope=not one.moved),
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
         torn_share=torn_share(points, one.lit),
@@ -151,14 +151,15 @@ def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
     return changes
 
 
-def hidden_of(lit: Illumination, *, plain: bool) -> float:
+def hidden_of(lit: Illumination, *, plain: bool, beside_slope: bool = True) -> float:
     """Return how many times more than enough lights these hide of what is not matte, by their number (of least squares
     1), or, of few lights, by how they stand where that is more."""
     lights = len(lit.directions)
     by_number = 1.0 if plain else hidden_by(lights) / hidden_by(ENOUGH_LIGHTS)
     if not ALL_EXPLAINED < lights <= FEW_LIGHTS:
         return by_number
-    times = turned_unseen(lit) / (TELLING_OF_FOUR if plain else TELLING)
+    of_four = FOUR_BESIDE_SLOPE if beside_slope else TELLING_OF_FOUR
+    times = turned_unseen(lit) / (of_four if plain else TELLING)
     return max(by_number, min(float(times**HIDDEN_POWER), MOST_HIDDEN))
 
 
