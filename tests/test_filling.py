@@ -1,5 +1,6 @@
 """What fewer than three lights reach: estimated from two, one or none of them, marked as such, and never invented."""
 
+import cv2
 import numpy as np
 import pytest
 from ring_and_ball import ring
@@ -131,6 +132,20 @@ def test_what_stands_before_a_wall_of_its_colour_does_not_lend_it_its_normal() -
     assert surface.source is not None
     assert (surface.source[shadow] == TWO_LIGHTS).all()
     assert angles_deg(surface.normals, normals)[shadow].mean() < 5
+
+
+def test_the_edge_of_a_shadow_within_a_pixel_is_no_normal_to_go_on_from() -> None:
+    rows, cols = np.mgrid[:SIZE, :SIZE]
+    normals = np.broadcast_to([0.0, 0.0, 1.0], (SIZE, SIZE, 3))
+    plates = plates_of(normals, np.array([0.45, 0.4, 0.5]))
+    shadow = (np.abs(cols - SIZE // 2) < 25) & (np.abs(rows - SIZE // 2) < 40)
+    edge = (cv2.dilate(shadow.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0) & ~shadow
+    plates[0][shadow] = 0
+    plates[0][edge] *= 0.5
+    surface = Solving().solve(plates, lit_by())
+    assert surface.source is not None
+    assert (surface.source[shadow] == TWO_LIGHTS).all()
+    assert angles_deg(surface.normals, normals)[shadow].mean() < 6
 
 
 def test_how_strong_the_lights_are_said_to_be_changes_the_albedo_only() -> None:

@@ -2,7 +2,8 @@
 
 Neighbours of the same colour suggest a normal and an albedo (``neighbours``), which the one or two lights that reach
 the pixel correct (``hernandez2011``). Pixels are filled in the order of their distance from solved ones. A step to
-another colour counts as a long one, so that a surface is filled from itself, and not across an outline.
+another colour counts as a long one, so that a surface is filled from itself, and not across an outline. A solved pixel
+in which a shadow ends has a normal of its own, which is none to go on from.
 """
 
 import numpy as np
@@ -15,11 +16,13 @@ from psvideo.solve.filling.bucket_queue import BUCKETS, FOREVER, NONE, Queue, pu
 from psvideo.solve.filling.hernandez2011 import from_one, from_two
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours, known_of, misfit
-from psvideo.solve.filling.tiles import THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
+from psvideo.solve.filling.tiles import AT_RIM, ODD_AT_RIM, THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
 
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
 MOST_STEPS = np.float32(50)
+BEHIND_PX = 2  # a normal beside a hole is held against those no farther from it that do not border on one,
+ODD = np.float32(np.cos(np.radians(10.0)))  # and is another than theirs from this angle on
 
 
 @FUSED.kept
@@ -35,6 +38,7 @@ def grow(tiles: Tiles, said: Said, where: NDArray[np.int32], queue: Queue, away:
     s = Said(lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour), said.noise)
     q = Queue(lent(queue.heads), lent(queue.following), lent(queue.preceding), lent(queue.distance))
     places, out = lent(where), lent(away)
+    _mark_rim(p, s, places)
     waiting = now = begun = farthest = 0
     for pixel in range(len(places)):
         distance = _start(p, s, places, pixel)
@@ -63,13 +67,49 @@ def grow(tiles: Tiles, said: Said, where: NDArray[np.int32], queue: Queue, away:
 
 
 @FUSED.called
+def _mark_rim(p: Tiles, s: Said, places: NDArray[np.int32]) -> None:
+    """Mark the solved pixels beside those that are to be filled, and of these the ones whose normals are none of the
+    surface behind them: where a shadow ends within a pixel, a light shows a part of what it would."""
+    for pixel in range(len(places)):
+        row, col = places[pixel, 0], places[pixel, 1]
+        for y in range(max(row - 1, 0), min(row + 2, p.rows)):
+            for x in range(max(col - 1, 0), min(col + 2, p.cols)):
+                if lights_at(p, y, x) == THREE_LIGHTS:
+                    p.lights[tile_at(p, y, x), y & WITHIN, x & WITHIN] = AT_RIM
+    for pixel in range(len(places)):
+        row, col = places[pixel, 0], places[pixel, 1]
+        for y in range(max(row - 1, 0), min(row + 2, p.rows)):
+            for x in range(max(col - 1, 0), min(col + 2, p.cols)):
+                if lights_at(p, y, x) == AT_RIM and _is_odd(p, s, pixel, y, x):
+                    p.lights[tile_at(p, y, x), y & WITHIN, x & WITHIN] = ODD_AT_RIM
+
+
+@FUSED.called
+def _is_odd(p: Tiles, s: Said, pixel: int, row: int, col: int) -> bool:
+    """Whether the normal of a solved pixel beside one that is to be filled is another one than that of the surface
+    behind it, though that explains what lights show of the latter."""
+    a, b, c, count = ZERO, ZERO, ZERO, ZERO
+    for y in range(max(row - BEHIND_PX, 0), min(row + BEHIND_PX + 1, p.rows)):
+        for x in range(max(col - BEHIND_PX, 0), min(col + BEHIND_PX + 1, p.cols)):
+            if lights_at(p, y, x) == THREE_LIGHTS:
+                one, two, three = known_of(p, y, x)
+                a, b, c, count = a + one, b + two, c + three, count + ONE
+    if not count > ZERO:
+        return False
+    a, b, c = a / count, b / count, c / count
+    one, two, three = known_of(p, row, col)
+    lengths = np.sqrt((a * a + b * b + c * c) * (one * one + two * two + three * three))
+    return bool(a * one + b * two + c * three < ODD * lengths and misfit(s, pixel, a, b, c) < ONE)
+
+
+@FUSED.called
 def _start(p: Tiles, s: Said, places: NDArray[np.int32], pixel: int) -> int:
     """Return the shortest step to a pixel from a solved neighbour, FOREVER where it has none."""
     row, col = places[pixel, 0], places[pixel, 1]
     nearest = FOREVER
     for side in range(4):
         y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
-        if 0 <= y < p.rows and 0 <= x < p.cols and lights_at(p, y, x) == THREE_LIGHTS:
+        if 0 <= y < p.rows and 0 <= x < p.cols and THREE_LIGHTS <= lights_at(p, y, x) <= ODD_AT_RIM:
             nearest = min(nearest, _step(p, s, y, x, row, col))
     return nearest
 

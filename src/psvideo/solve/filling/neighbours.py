@@ -5,7 +5,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded
 from psvideo.solve.filling.looking import Said
-from psvideo.solve.filling.tiles import THREE_LIGHTS, WITHIN, Tiles, tile_at
+from psvideo.solve.filling.tiles import ODD_AT_RIM, WITHIN, Tiles, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
 REACH_PX = 4  # neighbours are looked at so far in every direction,
@@ -13,7 +13,7 @@ SPREAD_PX = 2.0  # with weights that fall off so,
 SAME_COLOUR = np.float32(0.015)  # and with the colour: shares of red and blue that differ so much weigh a half;
 SAME_LIGHT = np.float32(0.2)  # what would show a light that differs by this share of it weighs a quarter,
 LEAST_SHARE = np.float32(1e-3)  # and nothing less than this;
-WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0], np.float32)  # of neighbours that no, one, two or three lights reach
+WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0, 1.0, 0.1], np.float32)  # of states: no, one, two lights, solved
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
 HALF, THIRD, TINY = np.float32(0.5), np.float32(1 / 3), np.float32(1e-6)
@@ -85,7 +85,7 @@ def from_neighbours(
         for x in range(max(col - REACH_PX, 0), min(col + REACH_PX + 1, p.cols)):
             tile, u = tile_at(p, y, x), x & WITHIN
             state = p.lights[tile, v, u]
-            if state > THREE_LIGHTS:
+            if state > ODD_AT_RIM:
                 continue
             there_red = decoded(p.albedo[tile, 0, v, u])
             there_blue = decoded(p.albedo[tile, channels - 1, v, u])
