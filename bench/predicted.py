@@ -28,7 +28,8 @@ from bench.table import table
 from psvideo.solve.normals.illumination import MAX_CONDITION, Illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
-from psvideo.solve.normals.trust.judging import SURE, Judging, looked_at
+from psvideo.solve.normals.trust.judging import Judging, looked_at
+from psvideo.solve.normals.trust.noise_spread import SURE
 from psvideo.solve.normals.trust.signs import Signs
 
 COUNTS = (5, 8, 12, 12, 24, 48, 96, 4)
