@@ -34,11 +34,12 @@ from psvideo.live.following.trims import Trims
 from psvideo.model.plan import Plan
 from psvideo.runs.on_set.live_strobe import held_strobe
 from psvideo.runs.steps.caller import PYTHON
+from psvideo.strobe.as_played import as_played
 from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.link.lines import Error
 from psvideo.strobe.link.requests import Trim
-from psvideo.strobe.runlog import RunLog, as_played, format_log
+from psvideo.strobe.runlog import RunLog, format_log
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 from psvideo.sync.rowfit.beat import FoundClock, train_between
 

@@ -14,8 +14,9 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan, read_plan
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.runs.strobe.run import run as play
+from psvideo.strobe.as_played import as_played
 from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
-from psvideo.strobe.runlog import as_played, format_log, plan_sha256, read_log
+from psvideo.strobe.runlog import format_log, plan_sha256, read_log
 from psvideo.strobe.seizures import Rate, flash_rates, seizure_warning
 
 RIGS = Path(__file__).resolve().parents[1] / "lights" / "rigs"

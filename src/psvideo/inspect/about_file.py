@@ -20,7 +20,8 @@ from psvideo.inspect.about_output import describe_output, output_around
 from psvideo.inspect.about_plan import plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, fault, ok, warn
 from psvideo.model.units import MISNAMED_PPM, counted
-from psvideo.strobe.runlog import as_played, read_log
+from psvideo.strobe.as_played import as_played
+from psvideo.strobe.runlog import read_log
 
 NEAR_PPM = 100.0
 """A clock that is off by what a misnamed rate makes, to this much, speaks of one: cameras' clocks are better."""

@@ -7,7 +7,7 @@ from psvideo.clip import Clip, Take, open_clip, parse_range
 from psvideo.clip.record import holes
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.strobe.runlog import as_played
+from psvideo.strobe.as_played import as_played
 
 MOST_MISSING, MOST_MISSING_SHARE = 10_000, 100
 """Where more frames are missing in a row than the first, and than this many times those that are there, it is not one

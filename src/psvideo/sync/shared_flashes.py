@@ -17,7 +17,7 @@ from psvideo.model.marker import cycle_places
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import MISNAMED_PPM, counted
-from psvideo.strobe.runlog import CAMERA_CLOCK_PPM
+from psvideo.strobe.as_played import CAMERA_CLOCK_PPM
 from psvideo.sync.same_strobe import refuse_other_strobe, refuse_unnumbered
 
 LEAST_SHARED = 8

@@ -99,48 +99,52 @@ def joined(looks: Sequence[SubjectPoints]) -> SubjectPoints:
     )
 
 
-def fitted(points: SubjectPoints) -> Reflectance | None:
-    """Return the model that explains the points best, solved with their normals in turn; of FOR_SHINE lights or more
-    any, of fewer that of rough surfaces alone."""
-    sizes = sizes_of(points)
-    known = sizes > 0
-    points = points.only(known)
-    g = points.normals * sizes[known, None]
-    if len(g) < LEAST_POINTS:
-        return None
-    typical = median(sizes[known])
-    model, explained, *_ = alternated(points, g, typical)
-    spread = np.linalg.svd(points.towards.mean(axis=1), compute_uv=False)
-    rough, by_rough = np.zeros(NUMBERS), 0.0
-    if spread[0] < WELL_SPREAD * spread[-1]:
-        rough, by_rough, *_ = alternated(points, g, typical, "rough")
-    few = len(points.measured) < FOR_SHINE
-    shines = True
-    if rough[ROUGH] >= LEAST_ROUGH and 1 - by_rough < LESS_LEFT * (1 - explained):
-        model, explained, shines = rough, by_rough, False
-    soft, by_soft, *_ = alternated(points, g, typical, "soft")
-    much_less = FEW_LEAVE if few else MUCH_LESS_LEFT
-    if LEAST_SOFT <= soft[SOFT] < MOST_SOFT and 1 - by_soft < much_less * (1 - explained):
-        model, explained, shines = soft, by_soft, False
-    if shines and few:
-        return None
-    if explained < LEAST_EXPLAINED:
-        return None
-    return Reflectance(*(float(each) for each in model[:SHINE]), *(float(each) * typical for each in model[SHINE:]))
-
-
-def sizes_of(points: SubjectPoints) -> Doubles:
-    """Return the albedo of every point with its normal, 0 where nothing was measured."""
-    cosines = np.maximum((points.towards * points.normals).sum(axis=-1), 0.05)
-    return _medians(points.measured / cosines, points.counts > 0)
-
-
 class ModelFollowed(NamedTuple):
     """A model, what it explains, and the normals that follow it, times albedo."""
 
     model: Doubles
     explained: float
     g: Doubles
+
+
+def fitted(points: SubjectPoints) -> Reflectance | None:
+    """Return the model that explains the points best, solved with their normals in turn; of FOR_SHINE lights or more
+    any, of fewer only that of rough or soft surfaces."""
+    sizes = sizes_of(points)
+    known = sizes > 0
+    points = points.only(known)
+    g = points.normals * sizes[known, None]
+    if len(g) < LEAST_POINTS:
+        return None
+    typical, few = median(sizes[known]), len(points.measured) < FOR_SHINE
+    kind, best = "shining", alternated(points, g, typical)
+    for other in _to_try(points):
+        found = alternated(points, g, typical, other)
+        if _leaves_less(found, best, other, few=few):
+            kind, best = other, found
+    if best.explained < LEAST_EXPLAINED or (few and kind == "shining"):
+        return None
+    of_albedo, lobes = best.model[:SHINE], best.model[SHINE:] * typical
+    return Reflectance(*(float(each) for each in (*of_albedo, *lobes)))
+
+
+def _to_try(points: SubjectPoints) -> tuple[Literal["rough", "soft"], ...]:
+    spread = np.linalg.svd(points.towards.mean(axis=1), compute_uv=False)
+    return ("rough", "soft") if spread[0] < WELL_SPREAD * spread[-1] else ("soft",)
+
+
+def _leaves_less(found: ModelFollowed, before: ModelFollowed, kind: Literal["rough", "soft"], *, few: bool) -> bool:
+    """Whether a model is of its kind, and leaves so much less than another that it is not that by chance."""
+    number, left = found.model[OF_KIND[kind]], (1 - found.explained) / (1 - before.explained)
+    if kind == "rough":
+        return bool(number >= LEAST_ROUGH and left < LESS_LEFT)
+    return bool(LEAST_SOFT <= number < MOST_SOFT and left < (FEW_LEAVE if few else MUCH_LESS_LEFT))
+
+
+def sizes_of(points: SubjectPoints) -> Doubles:
+    """Return the albedo of every point with its normal, 0 where nothing was measured."""
+    cosines = np.maximum((points.towards * points.normals).sum(axis=-1), 0.05)
+    return _medians(points.measured / cosines, points.counts > 0)
 
 
 def alternated(
