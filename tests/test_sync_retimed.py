@@ -340,3 +340,16 @@ def test_copies_are_known_though_lights_are_alike_in_every_row(inserted: bool, m
     timing = timing_from_rows(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
     assert timing.repeated_frames == ((13, 26, 40) if inserted else (12, 24, 37))
     assert timing.phase_error_rows < 0.01
+
+
+def test_lights_that_are_nearly_alike_in_every_row_make_no_copies(make_plan: PlanMaker) -> None:
+    """Now and then two such lights fill two frames in a row. Frames were called repeated there, and others missing."""
+    plan = make_plan(height_px=96, width_px=24, fps=Fraction(60), readout=0.9, duration_s=0.0013, dark_every=2)
+    rng = np.random.default_rng(8)
+    key, left = (0.2 + 0.5 * rng.random((96, 24)).astype(np.float32) for _ in range(2))
+    plates = dict(zip(plan.lit_slots, (key, left, 0.985 * left[:, ::-1]), strict=True))
+    clock = TrueClock(phase_s=0.008, offset_ppm=12.0)
+    shot = expose(plates, plan, frames=80, clock=clock, noise=NOISE, bits=12)
+    timing = timing_from_rows(plan, np.arange(80), shot.frames.mean(axis=2, dtype=np.float64))
+    assert (timing.repeated_frames, timing.dropped_frames) == ((), ())
+    assert timing.phase_error_rows < 0.01

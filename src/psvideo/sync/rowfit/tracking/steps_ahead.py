@@ -45,6 +45,10 @@ class Twins(NamedTuple):
             return Twins(self.alike[block], self.lit[block])
         return Twins(*(np.append(one[block][1:], one[block.stop]) for one in self))
 
+    def but(self, others: Mask) -> "Twins":
+        """Return those that are not among ``others`` (frame,)."""
+        return Twins(self.alike & ~others, self.lit & ~others)
+
     def turned(self, sign: int) -> "Twins":
         """Return the same in the order in which frames are followed."""
         return Twins(self.alike[::sign], self.lit[::sign])
@@ -75,6 +79,7 @@ def steps_ahead(
     beyond = block.start > 0, block.stop < len(rows.value)
     table[:, -LEAST] = losses_but_for_misfires(plan, learnt, ahead, beat, light, beyond=beyond)
     if same.lit.any():
+        same = same.but(same.lit & _as_planned(rows, block, ahead.value - predictions(plan, ahead, beat, light), sign))
         same = same._replace(lit=same.lit & due(plan, ahead, beat, sign))
     course = _cheapest(table[::sign], same.turned(sign), sign)[::sign]
     again = _repeats_alone(course[::sign], same.turned(sign), sign)
@@ -94,6 +99,15 @@ def due(plan: Plan, rows: Profiles, beat: Beat, sign: int) -> Mask:
         change += np.abs(predictions(plan, rows, beat, own) - predictions(plan, before, beat, own))
     found: Mask = change.mean(axis=1) > DUE
     return found
+
+
+def _as_planned(rows: Profiles, block: slice, rest: Doubles, sign: int) -> Mask:
+    """Return which frames of a block (frame,) are nearer to what the plan's flashes predict, all but ``rest`` (frame,
+    row), than to the frame followed before them: lights are nearly alike there, and no moment is shown again."""
+    at = np.arange(block.start, block.stop)
+    before = rows.value[np.clip(at - sign, 0, len(rows.value) - 1)]
+    nearer: Mask = (rest**2).sum(axis=1) < ((rows.value[at] - before) ** 2).sum(axis=1)
+    return nearer
 
 
 def _calm(loss: Doubles, usual: float) -> bool:
