@@ -13,6 +13,7 @@ from psvideo.model.surface import MEASURED
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.judging import looked_at
+from psvideo.solve.normals.trust.unchecked import alike_unseen_share
 
 Shade = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """What cosines to the light and to half way send back of an albedo of 1, (row, col)."""
@@ -94,11 +95,31 @@ def test_what_turns_normals_under_three_lights_shows_in_albedo(
 
 
 def test_under_lights_that_check_each_other_residuals_say_it() -> None:
-    assert shown_and_true_deg(shot(ring(4, 35), sheen))[0] == 0
+    and_one_between = np.concatenate([ring(4, 35), UP[None]])
+    for shade in (sheen, everywhere):
+        assert shown_and_true_deg(shot(and_one_between, shade))[0] == 0
     together = np.array([[0, 0.4, 1], [0.1, 0.4, 1], [0.5, 0, 1], [-0.1, -0.4, 1]])
     together /= np.linalg.norm(together, axis=1, keepdims=True)
     shown, true = shown_and_true_deg(shot(together, sheen))
     assert 0.4 < shown / true < 2.5
+
+
+@pytest.mark.parametrize("lights", [4, 5, 6, 8])
+def test_light_that_all_lamps_of_a_ring_add_shows_in_albedo_however_many_they_are(lights: int) -> None:
+    """To the last one they take it for normals that face the lens more, and leave nothing over."""
+    ways = ring(lights, 38)
+    assert alike_unseen_share(shot(ways, matte).lit) == 1
+    for albedo in (0.5, patches(3)):
+        case = shot(ways, everywhere, albedo=albedo)
+        shown, true = shown_and_true_deg(case)
+        assert true > 3
+        assert 0.6 < shown / true < 1.7
+        surface = Solving(error=True).solve(case.plates, case.lit, mask=case.mask)
+        assert surface.error_deg is not None
+        off_deg = angles_deg(surface.normals, case.truth)[case.mask]
+        assert (off_deg <= 2 * surface.error_deg[case.mask]).mean() > 0.9
+        assert surface.slope_deg == pytest.approx(shown, rel=0.3)
+        assert shown_and_true_deg(shot(ways, matte, albedo=albedo))[0] < 1
 
 
 def test_normals_that_a_sheen_turns_are_no_longer_trusted_under_three_lights() -> None:

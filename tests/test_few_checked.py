@@ -67,7 +67,7 @@ def solved(shade: Callable[[Array, Array], Array], noise: float = 0.001) -> tupl
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out what the model says, and what albedo shows that goes with the slope, which would count as well."""
     monkeypatch.setattr(signs, "turned_by_model_deg", lambda *_: None)
-    monkeypatch.setattr(signs, "by_slope_deg", lambda *_: np.float32(0))
+    monkeypatch.setattr(signs, "by_slope_deg", lambda *_, **__: np.float32(0))
 
 
 def test_a_sheen_under_four_lights_is_counted_in_what_normals_may_be_off_by(monkeypatch: pytest.MonkeyPatch) -> None:

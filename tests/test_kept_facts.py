@@ -15,7 +15,7 @@ RECORD_BYTES = 1000
 """A record of these numbers, each an object of its own, takes more: 17 places, 26 numbers, three tuples, two records.
 """
 MOST_BYTES = 290
-"""24 numbers of 8 bytes, 12 of what they are, 33 of what holds them, and two places in lists that grow by eighths."""
+"""25 numbers of 8 bytes, 12 of what they are, 33 of what holds them, and two places in lists that grow by eighths."""
 
 
 def _facts(number: int, seed: random.Random, lights: int = 4) -> InstantFacts:
@@ -44,6 +44,7 @@ def _facts(number: int, seed: random.Random, lights: int = 4) -> InstantFacts:
         misfit=misfit if seed.random() < 0.5 else None,
         measured_share=perhaps(),
         moving_valid_share=perhaps(),
+        slope_deg=some(),
     )
 
 

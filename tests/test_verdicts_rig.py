@@ -181,6 +181,40 @@ def test_what_is_not_known_of_near_lights_distance_is_said_and_not_laid_upon_the
     assert [line.grade for line in accuracy(one)] == ["good"]
 
 
+@pytest.mark.parametrize(("slope_deg", "grades"), [(2.9, []), (3.1, ["doubtful"]), (15.1, ["bad"])])
+@pytest.mark.parametrize("misfit", [None, Misfit(share=0.01, error_deg=20.0)])
+def test_albedo_that_goes_with_the_slope_is_named_where_it_says_how_far_normals_are_off(
+    slope_deg: float, grades: list[str], misfit: Misfit | None
+) -> None:
+    one = Footage(lights=4, solved=True).observed(0)
+    one.facts = KeptFacts(
+        replace(facts, misfit=misfit, slope_deg=slope_deg, valid_share=0.02, measured_share=1.0) for facts in one.facts
+    )
+    said = [line for line in accuracy(one) if "goes with the slope" in line.found]
+    (lacking,) = validity(one)
+    if misfit is None:
+        assert [line.grade for line in said] == grades
+        assert ("line on the typical error" in lacking.advice) == bool(grades)
+        assert (lacking.grade == "doubtful") == (grades == ["doubtful"]), "accuracy has its line, and its measure"
+    else:
+        (line,) = accuracy(one)
+        assert ("other angles to the lens" in line.advice) == (slope_deg > 10), "it is the larger part of what is off"
+    assert all("another angle to the lens" in line.advice for line in said)
+
+
+@pytest.mark.parametrize(("slope_deg", "named"), [(2.9, False), (3.1, True)])
+def test_under_three_lights_a_fourth_is_asked_for_where_albedo_goes_with_the_slope(
+    slope_deg: float, named: bool
+) -> None:
+    one = Footage(lights=3).observed(0)
+    one.facts = KeptFacts(
+        replace(facts, slope_deg=slope_deg, valid_share=0.02, measured_share=1.0) for facts in one.facts
+    )
+    (lacking,) = validity(one)
+    assert ("Use a fourth light" in lacking.advice) == named
+    assert [line.grade for line in accuracy(one)] == ["unknown"]
+
+
 @pytest.mark.parametrize("noise", [0.0005, 0.01])
 @pytest.mark.parametrize("lights", [3, 6])
 @pytest.mark.parametrize("shape", ["pipe", "bottle"])

@@ -87,6 +87,9 @@ class Surface:
         is none. None where nothing was filled, and all that is not valid is 0.
     misfit
         What is common to the picture; None where the solver does not look for it, or three lights explain all.
+    slope_deg
+        By how many degrees a typical normal is turned as albedo that goes with the slope shows it, which paint does
+        not: a sheen, haze, a lamp of another strength. 0 where nobody looked for it.
 
     Notes
     -----
@@ -101,6 +104,7 @@ class Surface:
     error_deg: Pixels | None = None
     misfit: Misfit | None = None
     source: NDArray[np.uint8] | None = None
+    slope_deg: float = 0.0
 
     @property
     def shown(self) -> NDArray[np.bool_]:

@@ -49,6 +49,18 @@ CLIPPING_FIRST = (
     "lights nearer to the camera's axis, or use more of them, so that three reach every part."
 )
 RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
+HALF = 0.5
+"""From this share of what normals are off by on, albedo that goes with the slope is what shows it: more lights at the
+same angle to the lens would not."""
+GOES_WITH_SLOPE = (
+    "goes with the slope, which paint seldom does: light shines through the surface (skin, wax) or comes from "
+    "everywhere (haze, flare, a bright room), the surface shines, or lamps are not as strong as the rig says"
+)
+BESIDE_THE_OTHERS = (
+    "These lights cannot tell which, nor take it off. One light more does that stands at another angle to the lens, "
+    "such as close beside it; or measure strengths on a white card (psvideo calibrate flat-field), clear the air and "
+    "darken the room"
+)
 CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
 
 
@@ -96,6 +108,8 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
     reached = [one.measured_share for one in known if one.measured_share is not None]
     enough = bool(reached) and float(np.median(reached)) >= LEAST_VALID
     beyond_deg = off_deg(observed)
+    if beyond_deg is None and _off_by_albedo(observed):
+        beyond_deg = by_slope_deg(observed.facts)
     by_surface = enough and (
         _steady(observed)
         if beyond_deg is None
@@ -128,10 +142,16 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
 
 def _trusting(observed: Observed) -> str:
     """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
-    if off_deg(observed) is None and _steady(observed):
+    said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
+    if _three(observed) and by_slope_deg(observed.facts) > COMMON_DEG:
         return (
-            "Measure the lights again, or use more of them; more light does not help. "
-            '`aov=["error"]` says how far off each pixel may be.'
+            f"Albedo {GOES_WITH_SLOPE}; or paint does so here. Three lights cannot tell. Use a fourth light, close "
+            'beside the lens or far from the others. `aov=["error"]` says how far off each pixel may be.'
+        )
+    if off_deg(observed) is None and _steady(observed) and not said:
+        return (
+            "Measure the lights again, clear the air and darken the room, or use more lights; brighter ones do not "
+            'help. `aov=["error"]` says how far off each pixel may be.'
         )
     noise_deg = by_noise_deg(observed.facts)
     if moves(observed.facts) and noise_deg > NOISY_DEG:
@@ -145,7 +165,6 @@ def _trusting(observed: Observed) -> str:
             "moves must be brought together. If nothing moved, light flickers, or the movie's coding changes the "
             'pictures. `aov=["error"]` says how far off each pixel may be.'
         )
-    said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
     if said and noise_deg < LITTLE_NOISE_DEG:
         return "More light does not help; the line on the typical error says what does."
     if next(distance(observed), None) is not None:
@@ -158,7 +177,10 @@ def _trusting(observed: Observed) -> str:
 def accuracy(observed: Observed) -> Iterator[Judgement]:
     """Judge how far off a typical normal is by more than noise, and what makes it so."""
     error_deg = off_deg(observed)
-    if error_deg is None and int(observed.firing.sum()) == ALL_EXPLAINED and _solved(observed.facts):
+    if error_deg is None and (by_albedo := _off_by_albedo(observed)):
+        yield by_albedo
+        return
+    if error_deg is None and _three(observed) and _solved(observed.facts):
         yield Judgement(
             subject="accuracy",
             grade="unknown",
@@ -183,6 +205,19 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
     )
 
 
+def _off_by_albedo(observed: Observed) -> Judgement | None:
+    """Judge how far off a typical normal is where nothing but albedo that goes with the slope shows it."""
+    slope_deg = by_slope_deg(observed.facts)
+    if slope_deg <= COMMON_DEG or _three(observed) or not _explained(observed):
+        return None
+    return Judgement(
+        subject="accuracy",
+        grade="bad" if slope_deg > LOST_DEG else "doubtful",
+        found=f"A typical normal is off by about {slope_deg:.0f} degrees: albedo {GOES_WITH_SLOPE}.",
+        advice=f'{BESIDE_THE_OTHERS}; `aov=["error"]` says how far off each pixel may be.',
+    )
+
+
 def _why_off(observed: Observed) -> tuple[str, str]:
     """Return what makes normals wrong beyond noise, and what to do about it."""
     if any(one.shows for one in observed.astray):
@@ -197,9 +232,10 @@ def _why_off(observed: Observed) -> tuple[str, str]:
             "other directions of the lights would explain more: they are a few degrees off, or the surface is glossy",
             "Measure the lights on a sphere beside the subject",
         )
+    alike = by_slope_deg(observed.facts) > HALF * (off_deg(observed) or 0.0)
     return (
         "the surface is not quite matte, or light comes by way of others (gloss, creases, soft shadows)",
-        "More lights, far apart, average it out",
+        f"More lights, far apart{' and at other angles to the lens than these' if alike else ''}, average it out",
     )
 
 
@@ -218,6 +254,10 @@ def distance(observed: Observed) -> Iterator[Judgement]:
         )
 
 
+def _three(observed: Observed) -> bool:
+    return int(observed.firing.sum()) == ALL_EXPLAINED
+
+
 def _solved(facts: Sequence[InstantFacts]) -> bool:
     return any(one.valid_share is not None for one in facts)
 
@@ -232,6 +272,12 @@ def by_noise_deg(facts: Sequence[InstantFacts]) -> float:
     """Return by how much noise turns a typical normal, in the mean; 0 where nothing says so."""
     known = [one.misfit.noise_deg for one in facts if one.misfit is not None]
     return MEAN_OF_HELD * float(np.median(known)) if known else 0.0
+
+
+def by_slope_deg(facts: Sequence[InstantFacts]) -> float:
+    """Return by how much typical normals are turned, in the mean, as albedo that goes with the slope shows it; 0 where
+    nothing does."""
+    return float(np.median([one.slope_deg for one in facts])) if facts else 0.0
 
 
 def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:
@@ -269,9 +315,13 @@ def _steady(observed: Observed) -> bool:
     """Return whether normals at rest change so little between results that noise is not to blame for what is not
     trusted, and the rig explains the plates: of few lights nothing else separates gloss or compression from noise."""
     known = [one.change.normals_deg for one in observed.facts if one.change is not None]
+    return _explained(observed) and bool(known) and float(np.median(known)) < COMMON_DEG
+
+
+def _explained(observed: Observed) -> bool:
+    """Return whether the rig explains what each light gives."""
     fit = observed.rig_fit
-    explained = fit is not None and fit.excess <= HARDLY_OFF
-    return explained and bool(known) and float(np.median(known)) < COMMON_DEG
+    return fit is not None and fit.excess <= HARDLY_OFF
 
 
 def moves(facts: Sequence[InstantFacts]) -> bool:

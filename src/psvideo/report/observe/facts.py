@@ -40,7 +40,8 @@ class InstantFacts:
     move, and ``moving_share`` how much of the picture does; None where it is not known. What changes too fast to be
     followed has a share and no speed. ``moving_valid_share`` is which share is valid of what moves and three lights
     reach, moving shadows too; None where hardly anything does.
-    ``misfit`` is what the robust solver found common to the whole picture.
+    ``misfit`` is what the robust solver found common to the whole picture, ``slope_deg`` by how much typical normals
+    are turned as albedo that goes with the slope shows it.
     """
 
     number: int
@@ -59,6 +60,7 @@ class InstantFacts:
     misfit: Misfit | None = None
     measured_share: float | None = None
     moving_valid_share: float | None = None
+    slope_deg: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +151,7 @@ def instant_facts(
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
+        slope_deg=0.0 if surface is None else surface.slope_deg,
         moving_valid_share=None if surface is None or stirs is None else _moving_valid(surface, subject, stirs),
     )
 

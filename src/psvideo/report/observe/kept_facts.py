@@ -9,7 +9,7 @@ from psvideo.model.surface import Misfit, Reflectance
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.steadiness import Change
 
-_FIXED = Struct("=qI17d")
+_FIXED = Struct("=qI18d")
 """A round's number, of how many lights there are levels, and what it has one number for; NaN is what is not known."""
 
 
@@ -73,6 +73,7 @@ def _packed(one: InstantFacts) -> bytes:
         one.clipped_share,
         one.unseen_share,
         one.borrowed_share,
+        one.slope_deg,
         *(nan if value is None else value for value in known),
         *change,
         *misfit,
@@ -82,7 +83,7 @@ def _packed(one: InstantFacts) -> bytes:
 
 
 def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
-    number, count, time_s, clipped_share, unseen_share, borrowed_share, *rest = _FIXED.unpack_from(packed)
+    number, count, time_s, clipped_share, unseen_share, borrowed_share, slope_deg, *rest = _FIXED.unpack_from(packed)
     valid, ambient, speed_px_s, moving, measured, held = (None if isnan(value) else value for value in rest[:6])
     change, misfit = rest[6:9], rest[9:]
     lights = memoryview(packed)[_FIXED.size :].cast("d")
@@ -94,6 +95,7 @@ def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
         clipped_share=clipped_share,
         unseen_share=unseen_share,
         borrowed_share=borrowed_share,
+        slope_deg=slope_deg,
         change=None
         if isnan(change[0])
         else Change(normals_deg=change[0], albedo_percent=change[1], level_percent=change[2]),

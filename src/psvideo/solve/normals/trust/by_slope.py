@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
-from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.model.arrays import Doubles, Flags, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred
 
@@ -51,24 +51,34 @@ as many degrees as the second number counts half, and nothing counts more: such 
 
 class _Pairs(NamedTuple):
     """Neighbours: how the logarithm of albedo differs (pair,), how functions of the normal do (pair, function), these
-    at the first of each (pair, function), where that is, in rows and columns over the subject's size (pair, 2)."""
+    at the first of each (pair, function), where that is and where the other is, in rows and columns over the subject's
+    size (pair, 2)."""
 
     differs: Doubles
     changes: Doubles
     here: Doubles
     place: Doubles
+    other: Doubles
 
 
-def by_slope_deg(points: ThinSurface, lit: Illumination, known: Mask) -> Floats:
+def by_slope_deg(
+    points: ThinSurface, lit: Illumination, known: Mask, *, unseen: float = 1.0, alike_unseen: float = 0.0
+) -> Floats:
     """Return by how many degrees normals are turned, as far as albedo that goes with the slope shows it, (row, col) of
     the points, of which these ``known`` speak for the subject; zeros where too few of them are in the light of all
-    lamps."""
+    lamps. By so much of itself counts what turns normals, and light that every lamp adds alike, where that is more:
+    ``unseen`` and ``alike_unseen`` by residuals (``unchecked.py``)."""
     normals, albedo, whole = _averaged(points, known)
     bright = _bright(normals, albedo, lit, whole)
     pairs = _pairs_of(normals, albedo, lit, bright)
     if pairs is None:
         return np.zeros(known.shape, np.float32)
-    shown = np.float32(TURNS_MORE * np.degrees(_goes_with_slope(pairs))) * _turned_beside_stretched(points, lit, bright)
+    shown = np.zeros(known.shape, np.float32)
+    if unseen:
+        typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs)))
+        shown = typical_deg * _turned_beside_stretched(points, lit, bright)
+    if alike_unseen:
+        shown = np.maximum(shown, np.float32(alike_unseen) * _turned_by_added_deg(points, lit, pairs))
     shown = np.sqrt(np.maximum(shown**2 - (np.float32(OF_NOISE) * points.noise_deg) ** 2, 0))
     return np.asarray(shown / (1 + shown / np.float32(LARGEST_DEG)), np.float32)
 
@@ -99,8 +109,9 @@ def _pairs_of(normals: Floats, albedo: Floats, lit: Illumination, bright: Mask) 
     ways = normals.reshape(3, -1).astype(np.float64)
     here, there = (_functions(ways[:, at].T, lit.directions) for at in (first, second))
     ones = np.log(albedo.reshape(-1)[np.stack([first, second])].astype(np.float64))
-    place = np.stack(np.divmod(first, cols), axis=-1) / np.sqrt(np.count_nonzero(bright))
-    return _Pairs(differs=ones[1] - ones[0], changes=there - here, here=here, place=place)
+    size = np.sqrt(np.count_nonzero(bright))
+    place, other = (np.stack(np.divmod(at, cols), axis=-1) / size for at in (first, second))
+    return _Pairs(differs=ones[1] - ones[0], changes=there - here, here=here, place=place, other=other)
 
 
 def _bright(normals: Floats, albedo: Floats, lit: Illumination, known: Mask) -> Mask:
@@ -146,16 +157,28 @@ def _goes_with_slope(pairs: _Pairs) -> float:
     return float(np.hypot(typical, typical_of_place) * np.sqrt(told))
 
 
+def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: _Pairs) -> Floats:
+    """Return by how many degrees light turns every normal that all lamps add alike, (row, col): as much of it as makes
+    albedo differ as it does. Lamps at one angle to an axis take such light for a vector along it, which stretches
+    normals that lean to it, and turns those that do not. Albedo may differ with the place as well, and what one half of
+    the subject does not tell of the other counts for nothing."""
+    added = np.linalg.pinv(lit.directions) @ np.ones(len(lit.directions))
+    moves = _of_place(pairs.other) - _of_place(pairs.place)
+    changes = np.concatenate([pairs.changes[:, :3] @ added[:, None], moves], axis=1)
+    black = _black_squares(pairs)
+    each = [float(_robustly(changes[one], pairs.differs[one])[0][0]) for one in (black, ~black) if one.any()]
+    much = max(min(each), 0.0)
+    along = np.tensordot(added.astype(np.float32), points.planes, axes=1)
+    across = np.sqrt(np.maximum(np.float32(added @ added) - along * along, np.float32(0)))
+    return np.asarray(np.degrees(np.float32(much)) * across, np.float32)
+
+
 def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
     """Return by how much each function counts in how albedo differs, and which share of what they explain functions
     of one half of the subject explain of the other."""
-    weights = np.ones(len(changes))
-    for _ in range(TURNS):
-        numbers = _solved(changes, pairs.differs, weights)
-        left = np.abs(pairs.differs - changes @ numbers)
-        weights = 1 / (1 + (left / (TYPICAL_OF_MEDIAN * median(left) + 1e-6)) ** 2)
-    black = (pairs.place / SQUARES).astype(np.intp).sum(axis=1) % 2 == 0
-    by_other = np.empty_like(left)
+    numbers, weights = _robustly(changes, pairs.differs)
+    black = _black_squares(pairs)
+    by_other = np.empty_like(weights)
     for one in (black, ~black):
         by_other[~one] = changes[~one] @ _solved(changes[one], pairs.differs[one], weights[one])
     whole = changes @ numbers
@@ -163,6 +186,21 @@ def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
     explained = _explained(pairs.differs, whole, weights)
     told = _explained(pairs.differs, np.clip(by_other, -most, most), weights)
     return numbers, min(told / explained, 1.0) if explained > 0 else 0.0
+
+
+def _black_squares(pairs: _Pairs) -> Flags:
+    """Return which pairs lie in black squares of a chess board over the subject, (pair,)."""
+    return np.asarray((pairs.place / SQUARES).astype(np.intp).sum(axis=1) % 2 == 0)
+
+
+def _robustly(changes: Doubles, differs: Doubles) -> tuple[Doubles, Doubles]:
+    """Return by how much each function (pair, function) counts in how albedo differs, and every pair's weight."""
+    weights = np.ones(len(changes))
+    for _ in range(TURNS):
+        numbers = _solved(changes, differs, weights)
+        left = np.abs(differs - changes @ numbers)
+        weights = 1 / (1 + (left / (TYPICAL_OF_MEDIAN * median(left) + 1e-6)) ** 2)
+    return numbers, weights
 
 
 def _explained(differs: Doubles, by_slope: Doubles, weights: Doubles) -> float:
@@ -184,12 +222,18 @@ def _about_median(values: Doubles) -> Doubles:
 
 def _without_place(values: Doubles, place: Doubles) -> tuple[Doubles, Doubles]:
     """Return what is left without what goes with the place (point, 2), a polynomial of second order, and that."""
-    row, col = (place - place.mean(axis=0)).T
-    terms = np.stack([np.ones_like(row), row, col, row * row, row * col, col * col], axis=-1)
+    place = place - place.mean(axis=0)
+    terms = np.concatenate([np.ones((len(place), 1)), _of_place(place)], axis=1)
     matrix = terms.T @ terms
-    matrix[np.diag_indices(6)] += 1e-9 * len(row)
+    matrix[np.diag_indices(6)] += 1e-9 * len(place)
     smooth = terms @ np.linalg.solve(matrix, terms.T @ values)
     return np.asarray(values - smooth), _about_median(smooth)
+
+
+def _of_place(place: Doubles) -> Doubles:
+    """Return what a polynomial of second order of the place (point, 2) consists of beside what is everywhere alike."""
+    row, col = place.T
+    return np.stack([row, col, row * row, row * col, col * col], axis=-1)
 
 
 def _turned_beside_stretched(points: ThinSurface, lit: Illumination, bright: Mask) -> Floats:

@@ -71,7 +71,9 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, usual])
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
-    return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
+    by_slope_deg = np.broadcast_to(np.float32(signs.by_slope_deg), points.known.shape)
+    slope_deg = _usual(by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
+    return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg)
 
 
 def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()) -> Surface:

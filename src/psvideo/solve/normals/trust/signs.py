@@ -23,7 +23,14 @@ from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
-from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, FEW_LIGHTS, torn_share, turned_unseen, unseen_share
+from psvideo.solve.normals.trust.unchecked import (
+    ALL_EXPLAINED,
+    FEW_LIGHTS,
+    alike_unseen_share,
+    torn_share,
+    turned_unseen,
+    unseen_share,
+)
 
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
@@ -104,7 +111,9 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
-    unseen = 0.0 if one.moved or not by_slope else unseen_share(one.lit)  # what was not followed goes with it too
+    unseen = alike = 0.0
+    if by_slope and not one.moved:  # what was not followed goes with it too
+        unseen, alike = unseen_share(one.lit), alike_unseen_share(one.lit)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -119,7 +128,9 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
         torn_share=torn_share(points, one.lit),
-        by_slope_deg=np.float32(unseen) * by_slope_deg(points, one.lit, still) if unseen else 0.0,
+        by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, alike_unseen=alike)
+        if unseen or alike
+        else 0.0,
     )
 
 

@@ -53,6 +53,11 @@ all residuals together show of it: lights up to the first check each other, from
 4 to 8 lights on five photographed and rendered subjects, those that turn less than 2.7 times left 0.5 % of what is
 trusted over 10 degrees, up to 3.7 times 1.9 %, beyond 2.8 %. Five lights on a ring, 35 degrees from the axis: 2.6; four
 within one quarter: 13.)"""
+ALIKE_SEEN, ALIKE_UNSEEN = 12.0, 24.0
+"""The same for light that every lamp adds alike, as haze and skin do. Lamps that all stand at the same angle to one
+axis, as on a ring about the lens, take it for a normal that leans to that axis, and leave nothing over, however many
+there are. (Rings of 4, 6 and 8 lights whose angles differ by 2 degrees: 400, 38 and 22. Chance sets of 5 and 8 of
+photographs' lights: 7.7 and 3.7 half of the time, 20 and 6 in one of ten.)"""
 NORMALS, FACING, LIT = 600, 0.35, 0.12
 """That is looked at in so many directions that face the camera so much, where all lights shine at such a cosine."""
 
@@ -84,10 +89,20 @@ def unseen_share(lit: Illumination) -> float:
     return min(max((turned_unseen(lit) - SEEN) / (UNSEEN - SEEN), 0.0), 1.0)
 
 
-def turned_unseen(lit: Illumination) -> float:
+def alike_unseen_share(lit: Illumination) -> float:
+    """Return 1 where residuals of four lights and more hardly show light that every lamp adds alike, and 0 where they
+    do; three leave nothing over, whatever it is, and what albedo shows of it was measured as a whole."""
+    if len(lit.directions) <= ALL_EXPLAINED:
+        return 0.0
+    turned = turned_unseen(lit, power=0)
+    return min(max((turned - ALIKE_SEEN) / (ALIKE_UNSEEN - ALIKE_SEEN), 0.0), 1.0)
+
+
+def turned_unseen(lit: Illumination, *, power: int = 2) -> float:
     """Return by how many times more than all residuals together a surface that is not quite matte turns normals, root
     mean squares over normals that all lights reach; infinite where nothing is left over, 0 where no normal is so lit.
-    Near lights count as they stand in the middle of the picture."""
+    Its light goes with a little of this ``power`` of the cosine as well. Near lights count as they stand in the middle
+    of the picture."""
     if len(lit.directions) <= ALL_EXPLAINED:
         return float("inf")
     strengths = lit.intensities.mean(axis=1) / lit.intensities.mean()
@@ -99,7 +114,7 @@ def turned_unseen(lit: Illumination) -> float:
     lit_by_all = (cosines > LIT).all(axis=1)
     if not lit_by_all.any():
         return 0.0
-    normals, added = normals[lit_by_all], cosines[lit_by_all] ** 2 * strengths
+    normals, added = normals[lit_by_all], cosines[lit_by_all] ** power * strengths
     matrix = lit.directions * strengths[:, None]
     g = added @ np.linalg.pinv(matrix).T
     left = added - g @ matrix.T
