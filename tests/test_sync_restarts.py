@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -20,8 +21,10 @@ from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.restarts import may_restart
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
 from psvideo.sync.rowfit.tracking.steps_ahead import Twins, steps_ahead
+from psvideo.sync.rowfit.unlit import still
 from psvideo.sync.unbroken import unbroken
 from psvideo.sync.verdict.believed import convincing
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, expose
@@ -405,3 +408,17 @@ def test_many_missing_frames_convince_only_where_rows_see_flashes_one_after_anot
     assert convincing(plan, found)
     assert convincing(plan, replace(found, steps=2, strayed=29)) == (readout > 0)
     assert convincing(plan, replace(found, steps=12, strayed=12, regular=True)), "by a rule"
+
+
+def test_lights_that_are_nearly_alike_do_not_make_the_picture_stand_still(make_plan: PlanMaker) -> None:
+    """The dark row stays below the picture for 24 frames, and no dark slot falls into them. Such a clip was taken to be
+    frozen there; its parts were searched for minutes, and the frames behind were lost."""
+    names = tuple(f"light {n}" for n in range(8))
+    plan = make_plan(lights=names, height_px=48, fps=Fraction(25), readout=0.5, duration_s=0.0006, dark_every=3)
+    rng = np.random.default_rng(5)
+    wall = 0.2 + 0.5 * rng.random((48, 24))
+    plates = {slot: (wall * (1 + 0.03 * rng.random((48, 1)))).astype(np.float32) for slot in plan.lit_slots}
+    shot = expose(plates, plan, frames=60, clock=TrueClock(phase_s=-0.1, offset_ppm=30.0), noise=Noise(full_well_e=2e5, read_e=5))
+    rows = rows_of(plan, shot.frames.mean(axis=2, dtype=np.float64))
+    assert still(plan, rows).sum() > 20
+    assert not may_restart(plan, rows, find(plan, rows))

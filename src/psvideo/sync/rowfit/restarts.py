@@ -43,6 +43,9 @@ HALVES = 0.5
 """The move must leave less than this share of the frames' losses where the clock is fitted to all of them again."""
 MOSTLY = 0.8
 """The strobe may have stopped where this share of the frames after the first odd one are odd."""
+FORETOLD = 0.25
+"""A fit that leaves less than this share of the squared changes of a picture that hardly changes foretells them: of
+mere noise it leaves nearly half."""
 ODD_RUN = 8
 """The strobe may have restarted where the median loss of this many frames in a row is odd."""
 
@@ -50,7 +53,7 @@ ODD_RUN = 8
 def may_restart(plan: Plan, rows: Profiles, found: ClipFit) -> bool:
     """Return whether a clip stands still for long, or its fit needs holes, or leaves frames in a row as only a strobe
     elsewhere in its cycle or none at all does."""
-    if found.steps > 0 or _stands(plan, rows).any() or lost_somewhere(plan, found):
+    if found.steps > 0 or _stands_still(plan, rows, found) or lost_somewhere(plan, found):
         return True
     return odd_somewhere(found)
 
@@ -104,6 +107,19 @@ def _moving_and_still(plan: Plan, rows: Profiles) -> tuple[list[slice], list[sli
     stands = _stands(plan, rows)
     parts = _runs_alike(stands)
     return [one for one in parts if not stands[one.start]], [one for one in parts if stands[one.start]]
+
+
+def _stands_still(plan: Plan, rows: Profiles, found: ClipFit) -> bool:
+    """Return whether the picture stands still for long, and not because lights are nearly alike there: then the fit
+    explains what little changes."""
+    shown = ~found.unlit & ~found.track.repeated
+    stands = _stands(plan, rows)
+    if not stands.any() or (stands & ~shown).any():
+        return bool(stands.any())
+    among = (stands[1:] & stands[:-1])[np.flatnonzero(shown)[1:] - 1]
+    change = np.diff(found.rows.value, axis=0)[among]
+    left: Doubles = found.fit.rest[1:][among]
+    return float((left**2).sum()) > FORETOLD * float((change**2).sum())
 
 
 def _stands(plan: Plan, rows: Profiles) -> Mask:
