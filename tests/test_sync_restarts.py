@@ -418,7 +418,9 @@ def test_lights_that_are_nearly_alike_do_not_make_the_picture_stand_still(make_p
     rng = np.random.default_rng(5)
     wall = 0.2 + 0.5 * rng.random((48, 24))
     plates = {slot: (wall * (1 + 0.03 * rng.random((48, 1)))).astype(np.float32) for slot in plan.lit_slots}
-    shot = expose(plates, plan, frames=60, clock=TrueClock(phase_s=-0.1, offset_ppm=30.0), noise=Noise(full_well_e=2e5, read_e=5))
+    shot = expose(
+        plates, plan, frames=60, clock=TrueClock(phase_s=-0.1, offset_ppm=30.0), noise=Noise(full_well_e=2e5, read_e=5)
+    )
     rows = rows_of(plan, shot.frames.mean(axis=2, dtype=np.float64))
     assert still(plan, rows).sum() > 20
     assert not may_restart(plan, rows, find(plan, rows))
