@@ -7,7 +7,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from psvideo.compute.spilled import thin
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing
 from psvideo.plates.align.denoise import Average, ResultNoise, averaged
@@ -16,6 +18,7 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.facts import InstantFacts, instant_facts
+from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.run_report import RunReport, report_record, steadiness_of
 from psvideo.solve.instants import Instant, denoised
@@ -253,6 +256,23 @@ def test_flicker_is_separated_from_noise_and_from_motion() -> None:
         valid=np.zeros((ROWS, COLS), np.bool_),
     )
     assert change(first, sample_of(nothing)) is None
+
+
+def test_a_round_is_thinned_once_for_all_that_its_report_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, asked = surface(np.random.default_rng(8)), []
+
+    def noted(picture: NDArray[np.floating], step: int) -> NDArray[np.floating]:
+        asked.append(picture is one.normals)
+        return thin(picture, step)
+
+    monkeypatch.setattr("psvideo.report.observe.thinned.thin", noted)
+    observed = Observed(lights=("a",))
+    for n in range(2):  # the first two rounds are looked at closely as well
+        plate = LightPlate(
+            light="a", number=n, time_s=float(n), picture=mixture_of(one.albedo), seen=np.ones(ROWS, np.bool_)
+        )
+        observed.add(Round(number=1001 + n, plates=(plate,)), one)
+    assert sum(asked) == 2
 
 
 def test_the_report_names_the_worst_instants() -> None:

@@ -105,10 +105,10 @@ def bands(rows: int) -> Iterator[tuple[int, int]]:
 
 
 def thin(picture: NDArray[Any], step: int) -> NDArray[Any]:
-    """Return every ``step``-th row and column of a picture (row, col[, channel]) in new memory; planes in files are let
-    go one after the other, since all of each comes into memory for it."""
+    """Return every ``step``-th row and column of a picture (row, col[, channel]) in new memory, every channel a plane
+    of its own there; planes in files are let go one after the other, since all of each comes into memory for it."""
     if picture.ndim == 3:
-        return np.stack([thin(picture[..., channel], step) for channel in range(picture.shape[-1])], axis=-1)
+        return np.moveaxis(np.stack([thin(plane, step) for plane in np.moveaxis(picture, -1, 0)]), 0, -1)
     some = picture[::step, ::step].copy()
     let_go(picture)
     return some

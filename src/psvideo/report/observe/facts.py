@@ -1,6 +1,7 @@
 """The facts of one round: what its plates and its surface say of the subject, in a few numbers."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,12 @@ class Seen:
     subject: NDArray[np.bool_]
     beyond: float = 0.0
 
+    @cached_property
+    def light(self) -> list[NDArray[np.float32]]:
+        """What is known of the subject's light, (sample,) of each light."""
+        known = self.subject & self.shown
+        return [picture[where] for picture, where in zip(self.bright, known, strict=True)]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Dark:
@@ -97,6 +104,11 @@ def thinned_round(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     return Seen(bright=bright, shown=shown, subject=lit | holes_in(lit))
 
 
+def share_of(flags: Flags) -> float:
+    """Return which share of some flags is set, at least one."""
+    return np.count_nonzero(flags) / flags.size
+
+
 def _beyond(most: NDArray[np.float32], subject: NDArray[np.bool_]) -> float:
     if not subject.any() or subject.all():
         return 0.0
@@ -111,21 +123,20 @@ def instant_facts(
     change: Change | None = None,
     *,
     seen: Seen | None = None,
+    some: Surface | None = None,
     moving: Motion | None = None,
     stirs: Flags | None = None,
     dark: Dark | None = None,
 ) -> InstantFacts:
     """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``stirs`` what
-    moves in it, on any grid, ``dark`` the ambient light, thinned out as ``seen`` is. Of a mask that holds none of the
-    points, nothing is known."""
+    moves in it, on any grid, ``dark`` the ambient light, thinned out as ``seen`` is, and ``some`` the surface, thinned.
+    Of a mask that holds none of the points, nothing is known."""
     seen = seen or thinned_round(one, mask)
-    subject, bright = seen.subject, seen.bright
-    valid, measured = (None, None) if slips(mask) else _shares(surface, subject)
-    lights = [picture[subject & shown] for picture, shown in zip(bright, seen.shown, strict=True)]
+    some = thin_surface(surface) if some is None and surface is not None else some
+    subject, lights = seen.subject, seen.light
+    valid, measured = (None, None) if slips(mask) else _shares(surface, some, subject)
     whites = [plate.saturation for plate in one.plates]
-    shares = [
-        float((light >= white).mean()) if light.size else 0.0 for light, white in zip(lights, whites, strict=True)
-    ]
+    shares = [share_of(light >= white) if light.size else 0.0 for light, white in zip(lights, whites, strict=True)]
     levels = [float(light.mean()) if light.size else 0.0 for light in lights]
     return InstantFacts(
         number=one.number,
@@ -133,7 +144,7 @@ def instant_facts(
         valid_share=valid,
         measured_share=measured,
         clipped_share=float(np.mean(shares)),
-        unseen_share=float(np.mean([1 - plate.lines_seen.mean() for plate in one.plates])),
+        unseen_share=float(np.mean([1 - share_of(plate.lines_seen) for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
         change=change,
         levels=tuple(level / white for level, white in zip(levels, whites, strict=True)),
@@ -143,8 +154,8 @@ def instant_facts(
             dark,
             subject,
             [
-                float(light.mean()) * plate.brightest_share
-                for light, plate in zip(lights, one.plates, strict=True)
+                level * plate.brightest_share
+                for level, light, plate in zip(levels, lights, one.plates, strict=True)
                 if light.size
             ],
         ),
@@ -152,30 +163,30 @@ def instant_facts(
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
         slope_deg=0.0 if surface is None else surface.slope_deg,
-        moving_valid_share=None if surface is None or stirs is None else _moving_valid(surface, subject, stirs),
+        moving_valid_share=None if some is None or stirs is None else _moving_valid(some, subject, stirs),
     )
 
 
-def _moving_valid(surface: Surface, subject: Flags, stirs: Flags) -> float | None:
-    """Return which share is valid of what moves and was measured."""
+def _moving_valid(some: Surface, subject: Flags, stirs: Flags) -> float | None:
+    """Return which share is valid of what moves and was measured, of a thinned surface."""
     (rows, cols), (high, wide) = subject.shape, stirs.shape
     moves = stirs[np.ix_(np.arange(rows) * high // rows, np.arange(cols) * wide // cols)]
-    some = thin_surface(surface)
-    there = subject & moves & (some.measured if surface.source is not None else some.shown)
+    there = subject & moves & (some.measured if some.source is not None else some.shown)
     count = int(there.sum())
     return float((some.valid & there).sum() / count) if count >= FEWEST_MOVING else None
 
 
-def _shares(surface: Surface | None, subject: NDArray[np.bool_]) -> tuple[float | None, float | None]:
-    """Return which shares of the subject are valid and measured. Of a surface that was filled, noise is none of it; of
-    one that was emptied, what was measured is not known."""
-    if surface is None:
+def _shares(
+    surface: Surface | None, some: Surface | None, subject: NDArray[np.bool_]
+) -> tuple[float | None, float | None]:
+    """Return which shares of the subject are valid and measured, of a surface and the same, thinned. Of a surface that
+    was filled, noise is none of it; of one that was emptied, what was measured is not known."""
+    if surface is None or some is None:
         return None, None
-    some = thin_surface(surface)
     filled = surface.source is not None and bool((surface.source > surface.valid.view(np.uint8)).any())
     whole = subject & some.shown if filled else subject
     count = max(int(whole.sum()), 1)
-    valid, measured = (float((part & whole).sum() / count) for part in (some.valid, some.measured))
+    valid, measured = (float(np.count_nonzero(part & whole) / count) for part in (some.valid, some.measured))
     return valid, measured if filled or valid == 1 else None
 
 
@@ -194,5 +205,5 @@ def _ambient_share(dark: Dark | None, subject: NDArray[np.bool_], levels: list[f
     what was seen of either."""
     if dark is None or not levels or not (subject & dark.known).any():
         return None
-    level = max(float(dark.level.mean(where=subject & dark.known)), 0.0)
+    level = max(float(dark.level[subject & dark.known].mean()), 0.0)
     return level / max(level + float(np.mean(levels)), 1e-9)

@@ -3,13 +3,14 @@ Recognition 44, 2011, section 3. An edge blurred once more loses the more of its
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Bytes, Floats
 from psvideo.plates.mixing.mixture import Mixture
 
 SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
@@ -25,6 +26,7 @@ LARGEST_PX = 1600
 SQUARE_PX, SQUARES = 160, 12
 """Of larger pictures, this many squares are looked at closely: those with the steepest edges, seen every fourth
 pixel."""
+BAND_ROWS = 32
 COARSE = 4
 EACH = 4
 """Noise is the median over every nth row and column: it varies by less than a hundredth."""
@@ -32,15 +34,20 @@ STEEP_SQUARE = 0.98
 STEEPEST = 1e-3
 """A slope counts from a quarter of the one that this share of the picture exceeds."""
 KERNEL = np.array([[-0.5, 0, 0.5]], np.float32)
+Kind = TypeVar("Kind", Floats, Bytes)
 
 
 def middle_of(picture: Mixture) -> NDArray[np.float32]:
     """Return the middle of a picture, grey (row, col), which is what its sharpness is judged by."""
     rows, cols = picture.shape[:2]
     top, left = max(rows - LARGEST_PX, 0) // 2, max(cols - LARGEST_PX, 0) // 2
-    bands = (picture.rows(range(row, min(row + SQUARE_PX, rows - top))) for row in range(top, rows - top, SQUARE_PX))
-    cut = (band[:, left : cols - left] for band in bands)
-    return np.concatenate([np.array(band if band.ndim == 2 else band[..., 1]) for band in cut])
+    read, grey = picture.reader(), np.empty((rows - 2 * top, cols - 2 * left), np.float32)
+    room = np.empty((BAND_ROWS, *picture.shape[1:]), np.float32)  # it stays in a core's second cache
+    for first in range(0, len(grey), BAND_ROWS):
+        band = grey[first : first + BAND_ROWS]
+        made = read(top + first, top + first + len(band), room[: len(band)])[:, left : cols - left]
+        band[:] = made if made.ndim == 2 else made[..., 1]
+    return grey
 
 
 def sharpest_blur_px(grey: NDArray[np.float32]) -> float | None:
@@ -110,30 +117,29 @@ def _blur_between(slopes: _Slopes, first_px: float, again_px: float, *, noise: f
     edges = steep > max(NOISE_FACTOR * noise, 0.25 * quantile(steep[:, ::2, ::2], 1 - steepest))
     rim = 4 + round(2 * again_px)
     edges[:, :rim], edges[:, -rim:], edges[:, :, :rim], edges[:, :, -rim:] = False, False, False, False
-    if edges.sum() < LEAST_EDGES:
+    if np.count_nonzero(edges) < LEAST_EDGES:
         return None
     edges &= np.stack([_ridge(*one) for one in zip(right, down, steep, strict=True)])
-    if edges.sum() < LEAST_EDGES:  # a wide blur takes most of the time
+    if np.count_nonzero(edges) < LEAST_EDGES:  # a wide blur takes most of the time
         return None
     soft = slopes.after(again_px)[2]
     edges &= soft > 0
-    if edges.sum() < LEAST_EDGES:
+    long = edges & (_each(_summed, edges.view(np.uint8)) >= TILE[0] / 2)
+    if np.count_nonzero(long) < LEAST_EDGES:
         return None
-    along = [_each(_summed, np.where(edges, one, np.float32(0))) for one in (steep, soft)]
-    long = edges & (_each(_summed, edges.astype(np.float32)) >= TILE[0] / 2)
-    if long.sum() < LEAST_EDGES:
-        return None
-    ratios = np.maximum((along[0][long] / along[1][long]) ** 2, 1 + 1e-3)
+    along = [_each(_summed, one * edges)[long] for one in (steep, soft)]
+    ratios = np.maximum((along[0] / along[1]) ** 2, 1 + 1e-3)
     blur_px = np.sqrt(np.maximum(again_px**2 - ratios * first_px**2, 0) / (ratios - 1))
     return quantile(blur_px, SHARPEST)
 
 
-def _each(function: Callable[[NDArray[np.float32]], NDArray[np.float32]], squares: Floats) -> Floats:
+def _each(function: Callable[[Kind], Kind], squares: Kind) -> Kind:
     return np.stack([function(one) for one in squares])
 
 
-def _summed(square: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.asarray(cv2.boxFilter(square, -1, TILE, normalize=False), np.float32)
+def _summed(square: Kind) -> Kind:
+    """Return sums over TILE; of no more flags than a byte counts."""
+    return np.asarray(cv2.boxFilter(square, -1, TILE, normalize=False), square.dtype)
 
 
 def _blurred(square: Floats, sigma_px: float) -> Floats:

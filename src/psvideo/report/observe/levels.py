@@ -25,7 +25,9 @@ def count_levels(light: NDArray[np.float32], saturation: float) -> Integers:
     """Return how many samples lie in every bin, shape (BINS + 2,): first those below 14 stops under saturation, last
     those that are clipped. Bins are read off the numbers' own bits: 8 of equal width per doubling."""
     relative = np.ascontiguousarray(light, np.float32).ravel() / np.float32(saturation)
-    place = np.clip((relative.view(np.int32) >> 20) - _BASE + 1, 0, BINS + 1)
+    place = relative.view(np.int32) >> 20
+    place -= _BASE - 1
+    np.maximum(np.minimum(place, BINS + 1, out=place), 0, out=place)
     return np.bincount(place, minlength=BINS + 2).astype(np.int64)
 
 

@@ -73,9 +73,13 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     if step > 1:
         grey = np.asarray(cv2.resize(grey, (cols // step, len(grey)), interpolation=cv2.INTER_AREA), np.float32)
     white = white or min(max(1.2 * quantile(grey[::2, ::2], 0.995), 1e-3), plate.saturation)
-    light = np.clip(grey / np.float32(white), 0, 1) + np.float32(TOE)
-    scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
-    codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
+    grey /= np.float32(white)
+    np.maximum(np.minimum(grey, 1, out=grey), 0, out=grey)
+    grey += np.float32(TOE)
+    np.sqrt(grey, out=grey)
+    grey -= np.float32(np.sqrt(TOE))
+    grey *= np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
+    codes = (grey + np.float32(0.5)).astype(np.uint8)
     whole = bool(plate.lines_seen.all())
     scale_px = plate.shape[1] / grey.shape[1]
     filled = coarser(filled_of(plate, chosen), 1, step)

@@ -35,7 +35,7 @@ from psvideo.report.observe.rig_and_curve.slopes import Averaged, coarse_normals
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
 from psvideo.report.observe.shadow import shadow_light
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
-from psvideo.report.observe.thinned import step_of, thinned
+from psvideo.report.observe.thinned import step_of, thin_surface, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
 
 UNEVEN = 0.5
@@ -172,15 +172,18 @@ class Observed:
                 self._glance(plate)
         self.watch_brightest()
         yield
-        moving, changed, stirs = self._moving, self._change(surface), self._stirring(one.time_s)
-        facts = instant_facts(one, surface, mask, changed, seen=seen, moving=moving, stirs=stirs, dark=self._dark)
+        some = None if surface is None else thin_surface(surface)
+        moving, changed, stirs = self._moving, self._change(surface, some), self._stirring(one.time_s)
+        facts = instant_facts(
+            one, surface, mask, changed, seen=seen, some=some, moving=moving, stirs=stirs, dark=self._dark
+        )
         self.facts.append(facts)
         yield
-        for plate, bright, shown in zip(one.plates, seen.bright, seen.shown, strict=True):
-            counted = count_levels(bright[seen.subject & shown], plate.saturation)
+        for plate, light in zip(one.plates, seen.light, strict=True):
+            counted = count_levels(light, plate.saturation)
             self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
         if (one.number - self.first + 1).bit_count() == 1:
-            yield from self._looking_closely(one, surface, seen)
+            yield from self._looking_closely(one, surface, some, seen)
         if surface is not None:
             self.worst.offer(facts, surface)
 
@@ -236,7 +239,7 @@ class Observed:
         """Small pictures of the worst instants, the worst first."""
         return self.worst.thumbnails
 
-    def _looking_closely(self, one: Round, surface: Surface | None, seen: Seen) -> Iterator[None]:
+    def _looking_closely(self, one: Round, surface: Surface | None, some: Surface | None, seen: Seen) -> Iterator[None]:
         yield
         watched = next((plate for plate in one.plates if plate.light == self.watched), one.plates[0])
         blur_px = sharpest_blur_px(middle_of(watched.picture))
@@ -248,7 +251,7 @@ class Observed:
             self.noises.append(noise)
         yield
         if surface is not None:
-            small = self.look_at_slopes(surface)
+            small = self.look_at_slopes(surface, some)
             yield
             found = lean(small, lens=self.lens)
             if found is not None:
@@ -260,13 +263,14 @@ class Observed:
             if self.stills and one.number == self.first and seen.subject.any():
                 self._look_at_places(one, seen, self.points)
 
-    def look_at_slopes(self, surface: Surface) -> Averaged:
-        """Look whether normals are those of one surface, which faces the camera; return them coarsely."""
+    def look_at_slopes(self, surface: Surface, some: Surface | None = None) -> Averaged:
+        """Look whether normals are those of one surface, which faces the camera; return them coarsely. ``some`` is the
+        surface, thinned."""
         small = coarse_normals(surface)
         agreement = surface_agreement(surface, small, lights=len(self.lights))
         if agreement is not None:
             self.slopes.append(agreement)
-        self.away.append(share_away(surface))
+        self.away.append(share_away(surface, some))
         return small
 
     def _look_at_places(self, one: Round, seen: Seen, points: RigPoints) -> None:
@@ -315,6 +319,6 @@ class Observed:
             return latest
         return None if before.changed is None else latest & before.changed
 
-    def _change(self, surface: Surface | None) -> Change | None:
-        before, self._sample = self._sample, None if surface is None else sample_of(surface)
+    def _change(self, surface: Surface | None, some: Surface | None) -> Change | None:
+        before, self._sample = self._sample, None if surface is None else sample_of(surface, some)
         return None if before is None or self._sample is None else change(before, self._sample)

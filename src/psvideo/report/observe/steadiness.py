@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Floats
+from psvideo.model.channels import mean_of_channels
 from psvideo.model.surface import Surface
 from psvideo.report.observe.thinned import thin_surface
 
@@ -31,20 +32,20 @@ class Change:
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """A surface, thinned."""
+    """A surface, thinned; ``normals`` are planes, (3, row, col)."""
 
     normals: Floats
     albedo: Floats
     valid: NDArray[np.bool_]
 
 
-def sample_of(surface: Surface) -> Sample:
-    """Return what to keep of a surface to hold the next one against."""
-    some = thin_surface(surface)
+def sample_of(surface: Surface, some: Surface | None = None) -> Sample:
+    """Return what to keep of a surface to hold the next one against; ``some`` is the surface, thinned."""
+    some = some or thin_surface(surface)
     albedo = some.albedo.astype(np.float32)
     return Sample(
-        normals=some.normals.astype(np.float32),
-        albedo=albedo if albedo.ndim == 2 else albedo.mean(axis=2),
+        normals=np.moveaxis(some.normals, -1, 0).astype(np.float32),
+        albedo=albedo if albedo.ndim == 2 else mean_of_channels(albedo),
         valid=some.measured,
     )
 
@@ -52,14 +53,12 @@ def sample_of(surface: Surface) -> Sample:
 def change(before: Sample, after: Sample) -> Change | None:
     """Return how much two results in turn differ where nothing moved; None where too little is at rest."""
     both = before.valid & after.valid & (before.albedo > 0)
-    window = (WINDOW, WINDOW)
-    early, late = (np.asarray(cv2.blur(one.normals * both[..., None], window), np.float32) for one in (before, after))
-    rest = both & _points_alike(early, late)
+    rest = both & _points_alike(*(_around(one.normals * both) for one in (before, after)))
     if rest.sum() < LEAST_PIXELS:
         return None
     some = np.flatnonzero(rest)
     some = some[:: max(len(some) // ENOUGH, 1)]
-    one, other = (sample.normals.reshape(-1, 3)[some] for sample in (before, after))
+    one, other = (sample.normals.reshape(3, -1)[:, some] for sample in (before, after))
     relative = after.albedo.ravel()[some] / before.albedo.ravel()[some] - 1
     return Change(
         normals_deg=median(_angle_deg(one, other)),
@@ -68,15 +67,19 @@ def change(before: Sample, after: Sample) -> Change | None:
     )
 
 
+def _around(planes: Floats) -> Floats:
+    """Return the means of planes (plane, row, col) over WINDOW."""
+    return np.stack([np.asarray(cv2.blur(plane, (WINDOW, WINDOW)), np.float32) for plane in planes])
+
+
 def _points_alike(one: Floats, other: Floats) -> NDArray[np.bool_]:
-    """Return where vectors of any length (row, col, 3) are turned by no more than MOST_TURNED_DEG."""
-    cosine, lengths = np.einsum("...i,...i", one, other), np.zeros(one.shape[:2], np.float32)
-    np.multiply(np.einsum("...i,...i", one, one), np.einsum("...i,...i", other, other), out=lengths)
+    """Return where vectors of any length (3, row, col) are turned by no more than MOST_TURNED_DEG."""
+    cosine, lengths = (one * other).sum(axis=0), (one * one).sum(axis=0) * (other * other).sum(axis=0)
     least = np.float32(np.cos(np.deg2rad(MOST_TURNED_DEG)))
     return np.asarray(cosine >= least * np.sqrt(lengths))
 
 
 def _angle_deg(one: Floats, other: Floats) -> NDArray[np.float64]:
-    """Return the angles between vectors of any length; exact for small ones."""
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return np.asarray(np.rad2deg(np.arctan2(across, np.einsum("...i,...i", one, other))), np.float64)
+    """Return the angles between vectors (3, place) of any length; exact for small ones."""
+    across = np.sqrt((np.cross(one, other, axis=0) ** 2).sum(axis=0))
+    return np.asarray(np.rad2deg(np.arctan2(across, (one * other).sum(axis=0))), np.float64)

@@ -151,9 +151,10 @@ def _turning(valid: NDArray[np.bool_], normals: NDArray[np.float32], blur_px: fl
     return _Turning(agreement, total / len(p_up), total / max(own, 1e-12), chance)
 
 
-def share_away(surface: Surface) -> float:
-    """Return which share of the normals that three lights gave faces away from the camera."""
-    some = thin_surface(surface)
+def share_away(surface: Surface, some: Surface | None = None) -> float:
+    """Return which share of the normals that three lights gave faces away from the camera; ``some`` is the surface,
+    thinned."""
+    some = some or thin_surface(surface)
     count = int(some.measured.sum())
     return float((some.normals[..., 2] < AWAY)[some.measured].sum() / count) if count >= LEAST_AWAY else 0.0
 

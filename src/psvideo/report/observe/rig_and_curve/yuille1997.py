@@ -173,9 +173,10 @@ def _in_view(n: Doubles, ways: Doubles, x: Doubles, y: Doubles, wide: float) -> 
 
 
 def _crossed(n: Doubles, ways: Doubles) -> Doubles:
-    """Return b x db/dx and b x db/dy, (point, 6); what faces the camera counts for more."""
-    facing = np.maximum(n[:, 2:] / np.linalg.norm(n, axis=1, keepdims=True), FACING)
-    return np.asarray(np.hstack([np.cross(n, ways[0]), np.cross(n, ways[1])]) * facing)
+    """Return b x db/dx and b x db/dy, (6, point); what faces the camera counts for more."""
+    (x, y, z), facing = n.T, np.maximum(n[:, 2] / np.linalg.norm(n, axis=1), FACING)
+    planes = [(y * c - z * b, z * a - x * c, x * b - y * a) for a, b, c in np.moveaxis(ways, -1, 1)]
+    return np.asarray(np.concatenate(planes) * facing)
 
 
 class _Fitted(NamedTuple):
@@ -188,11 +189,11 @@ class _Fitted(NamedTuple):
 
 
 def _fitted(crossed: Doubles, more: Doubles | None, *, near: _Fitted | None = None) -> _Fitted:
-    """Find c1 = (1 + a, b, c) and c2 = (d, 1 - a, e): their size is left open. ``more`` (point, 6): what one unknown
+    """Find c1 = (1 + a, b, c) and c2 = (d, 1 - a, e): their size is left open. ``more`` (6, point): what one unknown
     adds to ``crossed``; ``near`` is where to begin."""
-    still = crossed[:, 0] + crossed[:, 4]
-    terms = [crossed[:, 0] - crossed[:, 4], *crossed[:, [1, 2, 3, 5]].T]
-    terms += [] if more is None else [more[:, 0] + more[:, 4]]
+    still = crossed[0] + crossed[4]
+    terms = [crossed[0] - crossed[4], *crossed[[1, 2, 3, 5]]]
+    terms += [] if more is None else [more[0] + more[4]]
     slopes = np.stack(terms)
     found = np.zeros(len(terms))
     if near is not None:
@@ -244,6 +245,8 @@ def _described(rows: Doubles, gain: float, normals: Doubles) -> Lean:
 
 def _turned_deg(normals: Doubles, by: Doubles) -> float:
     """Return how far a matrix turns normals (point, 3) in the mean."""
-    turned = normals @ by
-    cosines = (turned * normals).sum(axis=1) / np.maximum(np.linalg.norm(turned, axis=1), 1e-12)
+    x, y, z = normals.T.copy()  # numpy is slow along a short last axis
+    turned = [x * by[0, axis] + y * by[1, axis] + z * by[2, axis] for axis in range(3)]
+    sizes = np.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2)
+    cosines = (turned[0] * x + turned[1] * y + turned[2] * z) / np.maximum(sizes, 1e-12)
     return float(np.degrees(np.arccos(np.clip(cosines, -1, 1))).mean())

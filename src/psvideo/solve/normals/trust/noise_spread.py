@@ -100,11 +100,11 @@ class NoiseSpread:
         step = self.step
         some = replace(
             surface,
-            normals=_thinned(surface.normals, step),
-            albedo=_thinned(surface.albedo, step),
+            normals=thin(surface.normals, step),
+            albedo=thin(surface.albedo, step),
             valid=surface.valid[::step, ::step],
-            residual=None if surface.residual is None else _thinned(surface.residual, step),
-            error_deg=None if surface.error_deg is None else _thinned(surface.error_deg, step),
+            residual=None if surface.residual is None else thin(surface.residual, step),
+            error_deg=None if surface.error_deg is None else thin(surface.error_deg, step),
             source=None,
         )
         fit, v = self.fit(some), self.noise.variances
@@ -182,10 +182,3 @@ def _typical_light(surface: Surface, one: Evidence) -> float:
     step = one.step_of(surface.valid.shape)
     shown = brightness(surface.albedo[::step, ::step])[surface.valid[::step, ::step]]
     return median(shown[shown >= median(shown)]) if shown.size else 0.0
-
-
-def _thinned(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:
-    """Return every nth row and column, channels in planes of their own as in a surface."""
-    if planes.ndim == 2:
-        return thin(planes, step)
-    return np.moveaxis(np.stack([thin(plane, step) for plane in np.moveaxis(planes, -1, 0)]), 0, -1)
