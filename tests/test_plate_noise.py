@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from psvideo.solve.normals import noise_samples
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import noise_of
 
@@ -129,3 +130,21 @@ def test_rounding_is_found_in_what_lights_leave_over_as_well() -> None:
     true = waves(0.8) * grain(1)
     plates = (np.round(255 * true) / 255).astype(np.float32)
     assert noise_of(list(plates), LIT).at(0.4) == pytest.approx(float(np.sqrt(np.mean((plates - true) ** 2))), rel=0.3)
+
+
+@pytest.mark.parametrize(("dark_rows", "looks"), [(0, 1), (64, 2)])
+def test_plates_are_looked_at_farther_apart_only_where_dark_shows_what_that_says(
+    dark_rows: int, looks: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows_of, asked = noise_samples.rows_of, []
+
+    def noted(plate: NDArray[np.float32], rows: NDArray[np.intp]) -> NDArray[np.floating]:
+        asked.append(rows)
+        return rows_of(plate, rows)
+
+    monkeypatch.setattr(noise_samples, "rows_of", noted)
+    plates = 0.3 + 0.5 * waves(1.0)
+    plates[:, :dark_rows] = 0.0
+    plates += np.random.default_rng(5).normal(0, 0.002, plates.shape)
+    noise_of(list(plates.astype(np.float32)))
+    assert len(asked) == looks * len(plates)

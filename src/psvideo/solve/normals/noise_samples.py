@@ -1,6 +1,6 @@
 """What plates show of their noise: how samples differ from those beside them, and from those farther away."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
@@ -64,10 +64,16 @@ class Differences:
 class NoiseSamples:
     """``beside``: how neighbours differ in one channel, or in the mean of all. ``apart``: how the mean differs over
     APART_PX. Means are times the root of the channels' number: as much as one, where noise is white and every channel
-    has its own of the same size. Small pictures have no places apart."""
+    has its own of the same size. Small pictures have no places apart; ``look_apart`` reads them once they are asked
+    for."""
 
     beside: Differences
-    apart: Differences
+    look_apart: Callable[[], Differences]
+
+    @cached_property
+    def apart(self) -> Differences:
+        """How the mean differs over APART_PX."""
+        return self.look_apart()
 
 
 def noise_samples(
@@ -105,7 +111,7 @@ def noise_samples(
     channels = lines(firsts, 1)
     one = channels[min(1, len(channels) - 1)]
     beside = of_mean(channels, 1, each) if grey else _differences(*_blurred(one, rng), 1, each)
-    return NoiseSamples(beside=beside, apart=of_mean(lines(wide, APART_PX), APART_PX, each // fewer))
+    return NoiseSamples(beside=beside, look_apart=lambda: of_mean(lines(wide, APART_PX), APART_PX, each // fewer))
 
 
 def _differences(lines: NDArray[np.floating], gaps: Doubles | None, px: int, each: int) -> Differences:

@@ -1,6 +1,6 @@
 """How noisy plates are, from the plates themselves: what their finest detail says where the picture has least of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,7 +85,7 @@ def noise_of(
     beside = Differences.of_all([one.beside for one in found])
     at, variances = _by_level(beside)
     channels = 1 if len(plates[0].shape) == 2 else plates[0].shape[2]
-    spread = _Spread.of(beside, Differences.of_all([one.apart for one in found]), channels, at, variances)
+    spread = _Spread.of(beside, lambda: Differences.of_all([one.apart for one in found]), channels, at, variances)
     alone = _line(at, spread.times(at) * variances)
     if lit is None or len(plates) <= 3:
         return alone
@@ -105,7 +105,7 @@ def spread_of(plates: Sequence[Samples] | Sequence[Mixture]) -> float:
         return 1.0
     beside, apart = (Differences.of_all(each) for each in ([one.beside for one in known], [one.apart for one in known]))
     channels = 1 if len(plates[0].shape) == 2 else plates[0].shape[2]
-    return _Spread.of(beside, apart, channels, *_by_level(beside)).in_light
+    return _Spread.of(beside, lambda: apart, channels, *_by_level(beside)).in_light
 
 
 def _left_over(of: Differences, matrix: Doubles) -> Differences:
@@ -137,12 +137,18 @@ class _Spread:
     in_light: float = 1.0
 
     @classmethod
-    def of(cls, beside: Differences, apart: Differences, channels: int, at: Doubles, variances: Doubles) -> "_Spread":
+    def of(
+        cls, beside: Differences, look_apart: Callable[[], Differences], channels: int, at: Doubles, variances: Doubles
+    ) -> "_Spread":
         """Light shows more of the picture than of its noise: there it is no more than in the dark. ``at`` and
-        ``variances`` are those of ``beside`` by level."""
+        ``variances`` are those of ``beside`` by level; nobody looks farther apart where there is no dark."""
         below = DARK * float(np.sqrt(variances[np.argmin(at)] / channels))
-        near, far = _in_dark(beside, below, 1), _in_dark(apart, below, channels)
-        if not 0 < LEAST_SPREAD * near < far:
+        near = _in_dark(beside, below, 1)
+        if near <= 0:
+            return cls()
+        apart = look_apart()
+        far = _in_dark(apart, below, channels)
+        if LEAST_SPREAD * near >= far:
             return cls()
         bright = at > BRIGHT * at.max()
         if not bright.any():
