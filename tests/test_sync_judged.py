@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
 
 from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.plan import Plan
+from psvideo.model.swing import Swing
 from psvideo.model.timing import Timing
+from psvideo.sync import frames_taken
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse import retime
@@ -21,6 +24,7 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import clock_through
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
+from psvideo.sync.verdict.remarks import remarks
 from psvideo.synth import Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -254,6 +258,26 @@ def test_a_camera_whose_gain_swings_is_not_taken_for_lamps_that_flicker(plan: Pl
     assert timing.swing.cause == "camera"
     assert timing.swing.share == pytest.approx(0.35, abs=0.08)
     assert timing.swing.sentence in timing.notes
+
+
+def test_edges_are_not_called_soft_while_the_camera_s_gain_swings(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between two frames of other gains an edge is bent: LEDs of no rise time were said to take 51 us."""
+    asked = list[tuple[Any, Any]]()
+
+    def kept(_: Plan, found: Any, *, swing: Any) -> tuple[str, ...]:
+        asked.append((found, swing))
+        return ()
+
+    monkeypatch.setattr(frames_taken, "remarks", kept)
+    timing_of(plan, filmed(plan, gain=1 + 0.15 * np.sin(np.arange(FRAMES) / 7)))
+    ((found, swing),) = asked
+    soft = replace(found, soft_s=51e-6)
+    assert any("are soft" in one for one in remarks(plan, soft, swing=None))
+    assert not any("are soft" in one for one in remarks(plan, soft, swing=swing))
+
+
+def test_what_comes_into_the_picture_is_named_beside_a_gain_that_would_explain_it() -> None:
+    assert "something bright comes or goes" in Swing(share=0.07, cause="either").sentence
 
 
 @pytest.mark.parametrize("room", [0.05, 0.1])

@@ -31,7 +31,10 @@ class Swing:
         compared = "Plates of different moments cannot be compared."
         if self.cause == "camera":
             return f"Whole frames grow brighter and darker {by}: {CAMERA}. {compared}"
-        return f"Light grows and shrinks {by}: {CAMERA}, or the lamps' supply changes. {compared}"
+        return (
+            f"Light grows and shrinks {by}: {CAMERA}, the lamps' supply changes, or something bright comes or goes. "
+            f"{compared}"
+        )
 
     @property
     def advice(self) -> str:

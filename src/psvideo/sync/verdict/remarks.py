@@ -46,7 +46,7 @@ def remarks(plan: Plan, found: ClipFit, *, swing: Swing | None) -> tuple[str, ..
         _mixed(plan, beat),
         *_camera(plan, found),
         "" if swing is None else swing.sentence,
-        _soft(found),
+        _soft(found) if swing is None else "",  # light that changes between two frames bends edges as well
         _unsteady(found),
         _sureness(plan, found),
     ]
