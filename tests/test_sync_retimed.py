@@ -19,6 +19,8 @@ from psvideo.sync.rowfit.coarse.retime import regular_step, twins
 from psvideo.sync.rowfit.coarse.seed import find_seed, other_seeds
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.tracking.course import memory_frames
+from psvideo.sync.rowfit.tracking.track import track
 from psvideo.sync.verdict.believed import convincing
 from psvideo.sync.verdict.refusal import clock_too_far
 from psvideo.synth import Exposure, Noise, TrueClock, expose
@@ -353,3 +355,16 @@ def test_lights_that_are_nearly_alike_in_every_row_make_no_copies(make_plan: Pla
     timing = timing_from_rows(plan, np.arange(80), shot.frames.mean(axis=2, dtype=np.float64))
     assert (timing.repeated_frames, timing.dropped_frames) == ((), ())
     assert timing.phase_error_rows < 0.01
+
+
+def test_a_copy_amid_the_frames_from_which_the_strobe_is_followed_is_known(make_plan: PlanMaker) -> None:
+    """Where brightness changes so much that no frames in a row fit well, a copy among them was not looked for: a flash
+    was taken for one 2 ms away, under another name."""
+    plan = make_plan(lights=tuple(f"light {n}" for n in range(8)), height_px=48, width_px=12, readout=0.66)
+    shot = shot_of(plan, 80)
+    rows = profiles_of(plan, shot)
+    beat = find_seed(plan, rows).beat
+    rows.value[:] *= np.exp(0.7 * np.sin(1.3 * np.arange(80)))[:, None]
+    rows.value[45] = rows.value[44]
+    tracked = track(plan, rows, beat, slice(24, 48), memory=memory_frames(plan, rows))
+    assert np.flatnonzero(tracked.repeated).tolist() == [45]

@@ -116,19 +116,25 @@ def from_first_frame(rows: Profiles, tracked: FrameTrack) -> FrameTrack:
 
 
 def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, int]:
-    """Return the longest run of frames in the seed that fit as well as most; all of it where there is none, as among
-    dark frames, which are twins of each other."""
+    """Return the longest run of frames in the seed that fit as well as most; where there is none, as among dark frames,
+    which are twins of each other, the longest of which none shows a moment again."""
     part = rows.take(seed)
     loss = _losses_of_most(plan, part, beat)
     calm = np.array([np.median(loss[max(n - 1, 0) : n + 2]) for n in range(len(loss))])
     good = calm < np.median(loss) + max(SUSPICIOUS, float(np.median(loss)))
     good &= ~twin_frames(rows)[seed]
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int64), [0]])))
+    for frames in (good, ~lit_twins(rows)[seed]):
+        length, first = _longest_run(frames)
+        if length >= min(LEAST_ANCHOR, len(loss)):
+            return seed.start + first, seed.start + first + length
+    return seed.start, seed.stop
+
+
+def _longest_run(frames: Mask) -> tuple[int, int]:
+    """Return how long the longest run of frames (frame,) is, and its first."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], frames.astype(np.int64), [0]])))
     runs = [(int(b - a), int(a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    length, first = max(runs, default=(0, 0))
-    if length < min(LEAST_ANCHOR, len(loss)):
-        return seed.start, seed.stop
-    return seed.start + first, seed.start + first + length
+    return max(runs, default=(0, 0))
 
 
 def _losses_of_most(plan: Plan, rows: Profiles, beat: Beat) -> Doubles:
