@@ -55,6 +55,16 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
     assert moved(5, aligned=True) == "doubtful"
 
 
+@pytest.mark.parametrize(("lost", "grade"), [(0, "doubtful"), (5, "doubtful"), (8, "bad")])
+def test_rounds_at_the_ends_of_a_take_below_360_degrees_do_not_make_the_others_useless(lost: int, grade: str) -> None:
+    """At 90 degrees five rounds of 61 lacked up to half of their rows, and 50 had all: the take was not usable."""
+    facts = [facts_of(number=n, unseen_share=0.5 if n < lost else 0.0, borrowed_share=0.5) for n in range(61)]
+    one = Observed(lights=("a",), facts=KeptFacts(facts))
+    (line,) = of_rows.coverage(plan_of(["a"], mode="rolling", dark_s=0.01), timing_of(exposure_s=0.0025), one)
+    assert line.grade == grade
+    assert ("In 5 of 61 rounds" in line.found) == (lost == 5)
+
+
 def test_check_and_the_whole_run_say_the_same_of_rows_that_come_from_other_rounds() -> None:
     """The worst round of a part was 93 %, of the whole 51 %, and the shutter hides 45 %."""
     plan = plan_of(["a"], mode="rolling", dark_s=0.01)

@@ -1,6 +1,6 @@
 """Judgements on rows and frames: rows that nobody saw, or under two flashes, and frames that are missing or repeat."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from psvideo.model.cost.in_step import IN_STEP, blind_share, dark_s_out_of_step, frames_in_step, never_shown
@@ -32,10 +32,11 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
     if take_s is not None and unseen > MOST_UNSEEN and _is_blind(timing) and not in_step(plan, timing):
         never = never_shown(_as_found(plan, timing), lasts_s=take_s, clock_offset_ppm=timing.clock_offset_ppm)
         unseen, borrowed = min(unseen, never), min(borrowed + unseen, 1.0)
+    rounds = [one.unseen_share for one in observed.facts] if take_s is None else []
     without_dark = not (plan.mode == "synced" or _is_blind(timing) or any(flash.is_dark for flash in plan.flashes))
     if take_s is not None and without_dark:
         unseen = 0.0  # more frames show the ambient light of more rows
-    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
+    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed, rounds)]
     holes = list(_dropped(timing, observed, alone=not (without_dark or _is_blind(timing))))
     lost = sum(one.unseen_share > MOST_UNSEEN for one in observed.facts)
     by_holes = bool(timing.dropped_frames) and (unseen <= LOST_UNSEEN or _few(lost, len(observed.facts)))
@@ -104,7 +105,10 @@ def in_step(plan: Plan, timing: Timing) -> bool:
     return _is_blind(timing) and never_shown(found, clock_offset_ppm=timing.clock_offset_ppm) > IN_STEP
 
 
-def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterator[Judgement]:
+def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float, rounds: Sequence[float]) -> Iterator[Judgement]:
+    """Judge a shutter that is closed for a part of the time. ``rounds`` are the shares of rows that each round of a
+    whole take lacks: at its two ends few others show them, and the rest serves."""
+    serves = unseen <= LOST_UNSEEN or _few(sum(one > LOST_UNSEEN for one in rounds), len(rounds))
     if not _is_blind(timing):
         return
     opened = f"the shutter is open for {360 * timing.exposure_s / timing.frame_period_s:.0f} degrees only"
@@ -119,14 +123,14 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterat
             + (", or in rolling mode" if plan.mode == "half-rate" else "")
             + ("." if other_s is None else f", or with a dark time (dark_s) of {other_s * 1e3:.4g} ms."),
         )
-    elif borrowed > MOST_UNSEEN and unseen <= LOST_UNSEEN:
+    elif borrowed > MOST_UNSEEN and serves:
         share = blind_share(_as_found(plan, timing), clock_offset_ppm=timing.clock_offset_ppm)
         share = share if share > MOST_UNSEEN else borrowed
         yield Judgement(
             subject="rows",
             grade="doubtful",
             found=f"{opened.capitalize()}: about {100 * share:.0f} % of a round's rows come from other rounds. What "
-            "stands still loses nothing by it, what moves in them is left out.",
+            f"stands still loses nothing by it, what moves in them is left out.{_lacking(rounds)}",
             advice="Shoot at 360 degrees.",
         )
     elif unseen > MOST_UNSEEN:
@@ -136,6 +140,16 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterat
             found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: {opened}.",
             advice="Shoot at 360 degrees.",
         )
+
+
+def _lacking(rounds: Sequence[float]) -> str:
+    """Say how many rounds lack rows that no other round shows, nothing where none does."""
+    lack = sum(one > MOST_UNSEEN for one in rounds)
+    if not lack:
+        return ""
+    return (
+        f" In {lack} of {len(rounds)} rounds no other one near by shows all rows: up to {100 * max(rounds):.0f} % lack."
+    )
 
 
 def _dropped(timing: Timing, observed: Observed, *, alone: bool) -> Iterator[Judgement]:
