@@ -7,7 +7,7 @@ subject into the folder: normals, albedo, validity, predicted error, and the sub
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -89,6 +89,8 @@ def subjects() -> Iterator[Subject]:
     """Give the photographed subjects, as whoever took them would hand them over."""
     for thing in ("bear", "cat"):
         whole = _diligent(SHARED_DATA / "diligent_photos" / thing, thing)
+        if thing == "bear":  # its first 19 photographs are a quarter brighter than their list says
+            whole = replace(whole, word="This take is doubtful")
         yield whole
         yield whole.choose(TWELVE)
         yield whole.choose(EIGHT)
