@@ -246,8 +246,12 @@ def test_a_rig_that_is_turned_beside_a_clip_that_is_turned_too_is_told_of_it(lig
 @pytest.mark.parametrize(("gain", "unmeasured"), [(1.0, True), (1.1, False)])
 def test_three_lights_do_not_show_the_rig_to_be_right(gain: float, unmeasured: bool) -> None:
     """One light is as strong as the rig says or a tenth weaker: nothing shows it, so nothing is called good."""
-    (line,) = rig_of(Footage(lights=3, claimed_gain=gain, solved=True).observed(0))
+    one = Footage(lights=3, claimed_gain=gain, solved=True).observed(0)
+    (line,) = rig_of(one)
     assert line.grade == "unknown"
+    assert "other strengths as well. Lights are hardly exchanged" in line.found
+    one.outward.clear()  # as of what has no outline
+    (line,) = rig_of(one)
     assert "other strengths or with two lights exchanged" in line.found
     assert "flat-field" in line.advice
     assert ("the strength 1" in line.found) is unmeasured

@@ -5,7 +5,13 @@ from collections.abc import Iterator, Sequence
 from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED, weaker_than_rig
 from psvideo.report.judge.of_strengths import other_strengths
-from psvideo.report.judge.rig_by_normals import facing_away, lights_crossed, normals_lean, surface_shines
+from psvideo.report.judge.rig_by_normals import (
+    facing_away,
+    facing_inwards,
+    lights_crossed,
+    normals_lean,
+    surface_shines,
+)
 from psvideo.report.judge.rig_by_plates import (
     lights_exchanged,
     lights_near,
@@ -33,7 +39,8 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     curve = said or (None if fit is None else other_curve(fit))
     wrong = None if fit is None or curve else rig_misfits(firing, fit)
     weaker = weaker_than_rig(observed)  # which leans normals, too, so that they are no surface's
-    crossed, away = None if weaker else lights_crossed(observed, guessed=guessed), facing_away(observed)
+    crossed = None if weaker else lights_crossed(observed, guessed=guessed) or facing_inwards(observed, guessed=guessed)
+    away = facing_away(observed)
     leaning = None if curve or wrong or crossed or away or weaker else normals_lean(observed)
     by_strength = fit is not None and bool(other_strengths(firing, fit))
     shines = wrong is not None and not (crossed or away or by_strength) and surface_shines(observed)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from psvideo.model.arrays import Doubles
+from psvideo.report.judge.rig_by_normals import faces_outwards
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
@@ -17,9 +18,14 @@ UNMEASURED = (
 
 def three_lights(observed: Observed) -> Judgement:
     """Say what three lights do not show, and what strengths that are off would cost."""
+    as_well = "other strengths or with two lights exchanged as well."
+    if faces_outwards(observed):
+        as_well = (
+            "other strengths as well. Lights are hardly exchanged, for normals face outwards where the subject ends."
+        )
     found = (
         "Whether the rig is right is not known: the normals fit together as one surface's, and under three lights they "
-        "mostly do so with other strengths or with two lights exchanged as well."
+        f"mostly do so with {as_well}"
     )
     advice = (
         "Measure the strengths on a white card (psvideo calibrate flat-field), check that lights have the same names "

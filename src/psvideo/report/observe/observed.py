@@ -29,6 +29,7 @@ from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import BINS, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
+from psvideo.report.observe.rig_and_curve.outward import outward
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.rigpoints import PointLight, RigPoints
 from psvideo.report.observe.rig_and_curve.slopes import Averaged, coarse_normals, share_away, surface_agreement
@@ -91,6 +92,7 @@ class Observed:
     noises: list[AgainstNoise] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     away: list[float] = field(default_factory=list)
+    outward: list[float] = field(default_factory=list)
     leans: list[Lean] = field(default_factory=list)
     in_shadow: list[float] = field(default_factory=list)
     astray: list[Astray] = field(default_factory=list)
@@ -196,6 +198,7 @@ class Observed:
         self.noises += other.noises
         self.slopes += other.slopes
         self.away += other.away
+        self.outward += other.outward
         self.leans += other.leans
         self.in_shadow += other.in_shadow
         self.astray += other.astray
@@ -256,6 +259,8 @@ class Observed:
             found = lean(small, lens=self.lens)
             if found is not None:
                 self.leans.append(found)
+            faces = outward(surface, seen.subject, step=step_of(*surface.valid.shape))
+            self.outward += [] if faces is None else [faces]
             yield
             self._look_into_shadow(one, surface, seen)
         if self.points is not None and one.lights == self.lights:

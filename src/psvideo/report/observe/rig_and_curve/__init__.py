@@ -3,5 +3,6 @@
 From plates: ``rigfit`` (what the rig leaves unexplained), ``lamp_strengths`` (how strong each light truly was),
 ``exchanged`` (two lights that are taken for each other), ``nearness`` (lights of a distant rig that stand near),
 ``other_curves`` (which transfer curve would fit better). From normals: ``slopes`` (whether they can be one surface's),
-``yuille1997`` (the one change of all of them that would make them so).
+``outward`` (whether they face outwards where the subject ends), ``yuille1997`` (the one change of all of them that
+would make them so).
 """
