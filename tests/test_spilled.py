@@ -4,6 +4,7 @@ import errno
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute import spilled
 from psvideo.errors import PsvideoError
+from psvideo.formats import exr_files
+from psvideo.model.choices import Compression
 from psvideo.model.rig import Light
 from psvideo.solve.filling.tiles import (
     LEFT_ALONE,
@@ -63,6 +66,23 @@ def test_what_was_let_go_is_read_back(tmp_path: Path, monkeypatch: pytest.Monkey
     picture = np.moveaxis(planes, 0, -1)
     spilled.let_go(planes[1, 7:31], picture[:90], np.zeros(4))
     assert (picture == np.moveaxis(wanted, 0, -1)).all()
+
+
+@pytest.mark.parametrize("compression", get_args(Compression))
+def test_what_packs_to_next_to_nothing_is_let_go_while_it_is_written(
+    compression: Compression, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planes, let_go, read = spilled.in_file((4, 512, 512), np.float32, tmp_path), spilled.let_go, list[bool]()
+
+    def noted(*parts: NDArray[np.float32]) -> None:
+        read.append(len(parts) == len(planes))
+        let_go(*parts)
+
+    monkeypatch.setattr("psvideo.formats.exr_files.let_go", noted)
+    monkeypatch.setattr(exr_files, "LET_GO_EACH_BYTES", planes.nbytes // 9)
+    channels = dict(zip("RGBA", planes, strict=True))
+    exr_files.write_exr(tmp_path / "still.exr", channels, half=False, compression=compression)
+    assert 4 <= sum(read) <= 18  # none is held for longer than it takes to read a quarter of all
 
 
 def test_a_disk_without_room_is_said_before_anything_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

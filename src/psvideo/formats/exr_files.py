@@ -20,9 +20,14 @@ from psvideo.formats.whole_files import whole_file
 from psvideo.model.choices import USUAL_COMPRESSION, Compression
 
 _INT32_MAX = 2**31 - 1
-AT_ONCE_ROWS = 2048
+AT_ONCE_ROWS = 256
 LET_GO_EACH_BYTES = 1 << 20
-"""What lies in files is let go after this many rows that were looked at, and each time that this much was written."""
+"""What lies in files is let go after this many rows that were looked at, and each time that OpenEXR has read this much:
+what is alike throughout, such as motion vectors of what stands, packs to next to nothing."""
+CHUNK_LINES: dict[Compression, int] = {"zip": 16, "zips": 1, "piz": 32, "rle": 1, "none": 1}
+"""So many lines are packed, and written, together."""
+NUMBER_BYTES = 8
+"""A chunk begins with numbers of this size and less."""
 
 _COMPRESSIONS: dict[Compression, object] = {
     "zip": OpenEXR.ZIP_COMPRESSION,
@@ -78,7 +83,7 @@ def write_exr(
         raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
     header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
-        _write(path, beside, lambda: OpenEXR.File(header, planes), tuple(planes.values()))
+        _write(path, beside, lambda: OpenEXR.File(header, planes), tuple(planes.values()), CHUNK_LINES[compression])
 
 
 def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:
@@ -94,17 +99,19 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
         stored, finite = halves_of(values.astype(np.float32, copy=False))
     else:
         stored = values.astype(np.float32, order="C", copy=False)
-        finite = bool(np.isfinite(stored).all())
-        let_go(stored)
+        finite = all(_finite(stored[first : first + AT_ONCE_ROWS]) for first in range(0, len(stored), AT_ONCE_ROWS))
     if not finite:
         raise ValueError(f"channel {name!r} holds NaN or infinity; missing pixels are 0 and marked in 'valid'")
     return np.asarray(stored if half else np.ascontiguousarray(stored, np.float32))
 
 
-def _finite(halves: NDArray[np.floating]) -> bool:
-    # the bits of positive infinity and, as unsigned ones, of negative infinity; NaN's are above
-    finite = int(halves.view(np.int16).max()) < 0x7C00 and int(halves.view(np.uint16).max()) < 0xFC00
-    let_go(halves)
+def _finite(rows: NDArray[np.floating]) -> bool:
+    if rows.dtype == np.float16:
+        # the bits of positive infinity and, as unsigned ones, of negative infinity; NaN's are above
+        finite = int(rows.view(np.int16).max()) < 0x7C00 and int(rows.view(np.uint16).max()) < 0xFC00
+    else:
+        finite = bool(np.isfinite(rows).all())
+    let_go(rows)
     return finite
 
 
@@ -169,7 +176,7 @@ def write_exr_parts(
 
     ``half`` may be given part by part. What the standard has all parts share is that of the first one which has it.
     """
-    built = []
+    built, every = [], list[NDArray[np.floating]]()
     shared = {key: one[key] for one in reversed([*attributes.values()]) for key in SHARED if key in one}
     for name, channels in parts.items():
         short = half if isinstance(half, bool) else half[name]
@@ -179,27 +186,30 @@ def write_exr_parts(
             | shared
             | _header(next(iter(planes.values())).shape, fps, time_code, None, compression)
         )
+        every += planes.values()  # which Part replaces by channels of its own
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
-        _write(path, beside, lambda: OpenEXR.File(built))
+        _write(path, beside, lambda: OpenEXR.File(built), every, CHUNK_LINES[compression])
 
 
 class _Stream:
-    """A file that OpenEXR writes into; large planes that it reads go back to the system's cache meanwhile.
+    """A file that OpenEXR writes into, ``lines`` of the planes at a time; large ones that it reads go back to the
+    system's cache meanwhile.
 
     ``fault`` is what went wrong first: OpenEXR swallows what does while it closes a file, where it goes back to write
     the table of its chunks, and a disk that was full then may have room again when Python closes it.
     """
 
-    def __init__(self, file: BinaryIO, planes: Sequence[NDArray[np.floating]]) -> None:
-        self._file, self._planes, self._written = file, planes, 0
+    def __init__(self, file: BinaryIO, planes: Sequence[NDArray[np.floating]], lines: int) -> None:
+        self._file, self._planes, self._read = file, planes, 0
+        self._chunk = lines * sum(plane.shape[1] * plane.itemsize for plane in planes)
         self.fault: OSError | None = None
 
     def write(self, data: bytes) -> int:
-        self._written += len(data)
-        if self._written > LET_GO_EACH_BYTES:
+        self._read += self._chunk if len(data) > NUMBER_BYTES else 0
+        if self._read > LET_GO_EACH_BYTES:
             let_go(*self._planes)
-            self._written = 0
+            self._read = 0
         return self._noted(lambda: self._file.write(data))
 
     def seek(self, place: int, whence: int = 0) -> int:
@@ -217,12 +227,13 @@ class _Stream:
 
 
 def _write(
-    path: Path, beside: Path, build: Callable[[], "OpenEXR.File"], planes: Sequence[NDArray[np.floating]] = ()
+    path: Path, beside: Path, build: Callable[[], "OpenEXR.File"], planes: Sequence[NDArray[np.floating]], lines: int
 ) -> None:
-    """Write what is built of ``planes`` to the file ``beside``, which stands for ``path`` until it is whole."""
+    """Write what is built of ``planes``, so many ``lines`` at a time, to the file ``beside``, which stands for ``path``
+    until it is whole."""
     try:
         with beside.open("wb") as file:
-            stream = _Stream(file, planes)
+            stream = _Stream(file, planes, lines)
             build().write(stream)
             if stream.fault is not None:
                 raise stream.fault

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Clip
 from psvideo.compute.halves import halves_of
-from psvideo.compute.spilled import let_go, room_of_planes
+from psvideo.compute.spilled import bands, let_go, room_of_planes
 from psvideo.export.sequences.plate_files import plate_name, write_light, write_plate
 from psvideo.export.sequences.result_files import Delivery, write_surface
 from psvideo.export.sequences.tags import Tags
@@ -107,9 +107,10 @@ def motion_of(
     ways = room_of_planes(4, rows, cols, np.float32, spare)
     fill_per_s(motion, ways[:2])
     for ahead, back, per in zip(ways[:2], ways[2:], (1 / fps, -1 / fps), strict=True):
-        ahead *= np.float32(per)
-        np.negative(ahead, out=back)
-        let_go(ahead, back)
+        for first, last in bands(rows):
+            ahead[first:last] *= np.float32(per)
+            np.negative(ahead[first:last], out=back[first:last])
+            let_go(ahead[first:last], back[first:last])
     return np.moveaxis(ways, 0, -1)
 
 
