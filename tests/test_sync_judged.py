@@ -172,6 +172,24 @@ def test_clips_that_show_nothing_are_refused_at_once(kind: str, plan: Plan) -> N
         timing_of(plan, profiles)
 
 
+def test_a_strobe_that_nearly_keeps_step_with_the_frames_is_no_noise(make_plan: PlanMaker) -> None:
+    """Two cycles are nearly a frame: only single rows beside dark ones change soon, and neighbours of these hardly."""
+    plan = make_plan(
+        lights=tuple("abcdef"),
+        height_px=96,
+        width_px=COLUMNS,
+        fps=Fraction(30),
+        shutter=1 / 18,
+        readout=0.98,
+        duration_s=0.0005,
+    )
+    rng = np.random.default_rng(0)
+    plates = {slot: (0.2 + 0.5 * rng.random((96, COLUMNS))).astype(np.float32) for slot in plan.lit_slots}
+    clock = TrueClock(phase_s=0.0123, offset_ppm=40.0)
+    shot = expose(plates, plan, frames=40, clock=clock, noise=NOISE, bits=12)
+    assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).phase_error_rows < 0.01
+
+
 def test_flashes_in_milliseconds_are_said_to_be_in_seconds(plan: Plan) -> None:
     long = tuple(replace(flash, duration_s=1e3 * flash.duration_s) for flash in plan.flashes)
     with pytest.raises(PsvideoError, match=r"duration_s = 0\.0008 is 0\.8 ms"):

@@ -60,7 +60,7 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
             f"{show_seconds(plan.camera.frame_period_s)}: no row sees one whole. Times in plan.toml are in seconds: "
             f"duration_s = {shortest_s * 1e-3:g} is {show_seconds(shortest_s * 1e-3)}."
         )
-    changes = _changes(rows)
+    changes = _changes(plan, rows)
     if float(np.abs(changes).max()) < 1e-9:
         return (
             "no strobe like the plan's was found in the picture: its rows do not change at all from frame to frame. "
@@ -119,8 +119,15 @@ def least_frames(plan: Plan) -> int:
     return len(plan.lit_slots) + 3
 
 
-def _changes(rows: Profiles) -> np.ndarray:
-    change: np.ndarray = np.diff(rows.binned(SEARCH_ROWS).value, axis=0)
+def _changes(plan: Plan, rows: Profiles) -> np.ndarray:
+    """Return how rows change from frames to others (frame, row) in which they see other flashes: soon, unless the
+    strobe nearly keeps step with the frames. Then only rows beside a dark row change from one frame to the next."""
+    value = rows.binned(SEARCH_ROWS).value
+    onward = np.arange(1, max(len(value) // 2, 1) + 1)
+    moved_s = np.abs((onward * rows.period_s + 0.5 * plan.cycle_s) % plan.cycle_s - 0.5 * plan.cycle_s)
+    enough_s = min(plan.cycle_s / len(plan.cycle_slots), float(moved_s.max()))
+    lag = int(onward[np.argmax(moved_s >= enough_s)])
+    change: np.ndarray = value[lag:] - value[:-lag]
     return change
 
 
