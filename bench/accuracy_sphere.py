@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.accuracy_measure import Accuracy
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
-from bench.table import Row
 from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.mirror.lights import calibrate_lights
 from psvideo.calibrate.mirror.measured import MirrorCalibration
@@ -22,7 +22,7 @@ LIGHTS = ((0.3, 0.4, 0.87), (-0.5, 0.2, 0.84), (0.1, -0.4, 0.9), (0.7, 0.3, 0.4)
 PSBOX_CIRCLE = (535.9, 478.0, 421.13)
 
 
-def rows() -> Iterator[Row]:
+def rows() -> Iterator[Accuracy]:
     """Yield the errors of directions, with the standard errors that the calibration gave itself."""
     if DATA.is_dir():
         psbox = DATA / "psbox_sphere" / "LightProbe-1"
@@ -63,14 +63,16 @@ def _virtual(off_axis_deg: float, focal: float | None) -> MirrorCalibration:
     return calibrate_lights(sight_spheres([pictures], Looking(focal_px=focal), where="virtual"))
 
 
-def _row(what: str, found: MirrorCalibration, truth: np.ndarray, bar_deg: float | None, *, worst: bool = False) -> Row:
+def _row(
+    what: str, found: MirrorCalibration, truth: np.ndarray, bar_deg: float | None, *, worst: bool = False
+) -> Accuracy:
     vectors = np.array([light.direction for light in found.lights])
     errors = np.degrees(np.arccos(np.clip((vectors * unit(truth)).sum(axis=1), -1, 1)))
     own = np.sqrt(np.mean([light.error_deg**2 for light in found.lights]))
     counted = errors.max() if worst else errors.mean()
-    return Row(
+    return Accuracy(
         f"light direction: {what}",
-        f"mean {errors.mean():.2f}, worst {errors.max():.2f} deg (own standard error {own:.2f})",
-        "" if bar_deg is None else f"{'worst' if worst else 'mean'} <= {bar_deg:g} deg",
-        None if bar_deg is None else bool(counted <= bar_deg),
+        after=f"mean {errors.mean():.2f}, worst {errors.max():.2f} deg (own standard error {own:.2f})",
+        bar="" if bar_deg is None else f"{'worst' if worst else 'mean'} <= {bar_deg:g} deg",
+        met=None if bar_deg is None else bool(counted <= bar_deg),
     )
