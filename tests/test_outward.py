@@ -13,12 +13,13 @@ from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.outward import outward
+from psvideo.report.observe.thinned import thin_surface, thinned
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-SIZE = 160
+SIZE = 240
 ROWS, COLS = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
 X, Y = COLS / (0.45 * SIZE), -ROWS / (0.45 * SIZE)
 RADIUS = np.hypot(X, Y)
@@ -65,7 +66,7 @@ def solved(shape: tuple[Array, Mask], ways: Array, claimed: Array) -> tuple[list
 
 
 def facing(shape: tuple[Array, Mask], ways: Array, claimed: Array) -> float | None:
-    return outward(solved(shape, ways, claimed)[1], shape[1][::2, ::2], step=2)
+    return outward(thin_surface(solved(shape, ways, claimed)[1]), thinned(shape[1]))
 
 
 @pytest.mark.parametrize("lights", [3, 5])
@@ -97,10 +98,10 @@ def test_where_the_picture_ends_or_an_outline_faces_one_way_nothing_is_said() ->
     ways = ring(3, 30)
     normals, inside = ball()
     surface = solved((normals, inside), ways, ways)[1]
-    assert outward(surface, np.ones((SIZE // 2, SIZE // 2), np.bool_), step=2) is None
+    assert outward(thin_surface(surface), thinned(np.ones((SIZE, SIZE), np.bool_))) is None
     cut = slice(SIZE * 3 // 4, None)  # the picture ends within the ball, and its right side is in it
     part = solved((normals[:, cut], inside[:, cut]), ways, ways)[1]
-    assert outward(part, inside[:, cut], step=1) is None
+    assert outward(thin_surface(part), thinned(inside[:, cut])) is None
 
 
 def said_of(shape: tuple[Array, Mask], ways: Array, claimed: Array, *, guessed: bool = False) -> Judgement:

@@ -28,7 +28,9 @@ from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame
 from psvideo.report.judge.of_rows import MOST_UNSEEN
 from psvideo.report.judge.result import NOISY_DEG
 from psvideo.report.judgement import Judgement
+from psvideo.report.observe.facts import thinned_round
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.thinned import thin_surface
 from psvideo.runs.instants.reporting import observing
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
@@ -218,7 +220,9 @@ def _look_at_slopes(observed: Observed, one: Round, plan: Plan, rig: Rig) -> Non
     if whole and len(lights) >= LEAST_LIGHTS and all(light.direction is not None for light in lights):
         surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True, fill=False))).surface
         if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
-            observed.look_at_slopes(surface)
+            some = thin_surface(surface)
+            observed.look_at_slopes(surface, some)
+            observed.look_at_outline(some, thinned_round(one, None).subject)
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:

@@ -259,8 +259,7 @@ class Observed:
             found = lean(small, lens=self.lens)
             if found is not None:
                 self.leans.append(found)
-            faces = outward(surface, seen.subject, step=step_of(*surface.valid.shape))
-            self.outward += [] if faces is None else [faces]
+            self.look_at_outline(thin_surface(surface) if some is None else some, seen.subject)
             yield
             self._look_into_shadow(one, surface, seen)
         if self.points is not None and one.lights == self.lights:
@@ -277,6 +276,11 @@ class Observed:
             self.slopes.append(agreement)
         self.away.append(share_away(surface, some))
         return small
+
+    def look_at_outline(self, some: Surface, subject: Flags) -> None:
+        """Look whether normals face outwards where the ``subject`` ends; ``some`` is the surface, both thinned."""
+        faces = outward(some, subject)
+        self.outward += [] if faces is None else [faces]
 
     def _look_at_places(self, one: Round, seen: Seen, points: RigPoints) -> None:
         shape = one.plates[0].shape[:2]

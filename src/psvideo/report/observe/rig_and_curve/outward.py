@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import thin
 from psvideo.model.arrays import Floats
 from psvideo.model.surface import Surface
 
@@ -27,17 +26,17 @@ ALL_AROUND = 0.7
 """Outlines that face one way tell little: their mean direction is shorter than this."""
 
 
-def outward(surface: Surface, subject: NDArray[np.bool_], *, step: int) -> float | None:
+def outward(some: Surface, subject: NDArray[np.bool_]) -> float | None:
     """Return the mean cosine between steep normals at the subject's outline and the way out: 1 for a body that stands
     free, about 0 under lights that are exchanged, -1 for a bowl. None where too little of an outline shows.
 
-    subject: (row, col), every ``step``-th pixel of the surface's. Where the picture ends the subject does not.
+    some: a surface, thinned as the ``subject`` (row, col) is. Where the picture ends the subject does not.
     """
     away, right, up = _ways_out(subject)
     slope = np.hypot(right, up)
-    normals = thin(surface.normals, step).astype(np.float32)
+    normals = some.normals.astype(np.float32)
     leaning = np.hypot(normals[..., 0], normals[..., 1])
-    rim = subject & surface.measured[::step, ::step] & (away <= NEAR) & (slope > CLEAR)
+    rim = subject & some.measured & (away <= NEAR) & (slope > CLEAR)
     at = rim & (leaning > STEEP)
     if at.sum() < max(LEAST_POINTS, LEAST_SHARE * rim.sum()):
         return None
