@@ -12,5 +12,7 @@ Rooms, from the bottom up:
 - ``velocity``: where things move, found from all lights together
 - ``doubt``: by how much a plate may be off because the two that it comes from do not match
 
+``own_ways`` makes, for eyes, what no common motion explains between two plates.
+
 What aligned plates are used for: ``open_shutter`` (motion blur), ``denoise`` (means over time).
 """

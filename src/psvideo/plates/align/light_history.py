@@ -26,6 +26,7 @@ from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch, changed, sketch_of, white_of
 from psvideo.plates.align.velocity.followed import Followed
+from psvideo.plates.align.velocity.own_flow import OwnFlows
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS
 
@@ -88,7 +89,8 @@ class Held:
     is the round that plates come of, ``whole`` the last one that was complete (None before any was), and ``middle_s``
     its middle. ``motion`` says by light and round what was compared with the round before, and where it had moved;
     ``drift`` where it had since the ``first`` sketch of a light in a block of rounds that are pooled. ``put_by`` takes
-    codes of packed plates. ``lamps`` is how the lights shine, None where that is not known.
+    codes of packed plates. ``own_flows`` are those of the plates around the last instant of which nothing is measured.
+    ``lamps`` is how the lights shine, None where that is not known.
     """
 
     lights: tuple[str, ...]
@@ -105,6 +107,7 @@ class Held:
     motion: dict[tuple[str, int], Flags] = field(default_factory=dict)
     drift: dict[tuple[str, int], Flags] = field(default_factory=dict)
     first: dict[str, Sketch] = field(default_factory=dict)
+    own_flows: OwnFlows = field(default_factory=OwnFlows)
     newest: int = 0
     whole: int | None = None
     middle_s: float = 0.0

@@ -27,12 +27,14 @@ from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_
 from psvideo.plates.align.doubt.unsure import UNKNOWN
 from psvideo.plates.align.left_out import AtInstant, better_without
 from psvideo.plates.align.light_history import Around, DueInstant, Held
+from psvideo.plates.align.own_ways import along_own_ways
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.align.velocity.moving_kernel import NOWHERE
+from psvideo.plates.align.velocity.own_flow import OwnFlow
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 
@@ -207,8 +209,14 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
             guesses = [one.source for one in shown]
     instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
     instant.unsure[:, unknown] = UNKNOWN
+    own = held.own_flows.of(dict(zip(lights, pairs, strict=True))) if instant.guessed else dict[str, OwnFlow]()
     for light, source, guess in zip(lights, sources, guesses, strict=True):
-        _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion, held.put_by))
+        around = held.sure_around(light, instant)
+        plate = _moved_to(around, source, guess, motion, held.put_by)
+        if light in own and around.before.plate is not None and around.after.plate is not None:
+            ends = around.before.plate, around.after.plate
+            plate = along_own_ways(plate, ends, own[light], motion, put_by=held.put_by)
+        _hand_on(instant, plate)
         instant.moving.remove(light)
         held.let_go()
 

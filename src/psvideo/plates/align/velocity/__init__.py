@@ -5,4 +5,6 @@ It chooses between what ``all_lights`` propose: ``flow`` (dense optical flow, on
 ``sketch_kernel`` and compared by their ``detail``, loops in ``detail_kernel``), ``correlation`` (how far the picture
 shifted as a whole), and rest; ``between_lights`` says whether neighbouring lights agree along it. Its loops are in
 ``moving_kernel``. ``brightness`` removes changes of exposure first. ``vectors`` makes motion vectors for compositing.
+
+``own_flow`` is for eyes: how a light's own plates lead into each other where all lights have no motion in common.
 """
