@@ -188,7 +188,7 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
         observed.add(one)
         if rig is not None and not observed.away and one.lights == apart.plan.lights:
-            _look_at_slopes(observed, one, apart.plan, rig)
+            _look_at_normals(observed, one, apart.plan, rig)
         del one
     if not observed.facts:
         raise PsvideoError(
@@ -212,13 +212,13 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     return (seen, *judged)
 
 
-def _look_at_slopes(observed: Observed, one: Round, plan: Plan, rig: Rig) -> None:
-    """Solve a round and look whether its normals are one surface's: directions that are mirrored, or lights exchanged,
-    explain the plates as well. Near lights would need the surface's distance for it; noise belongs to no surface, nor
-    does a round that was not seen whole."""
+def _look_at_normals(observed: Observed, one: Round, plan: Plan, rig: Rig) -> None:
+    """Solve a round and look whether its normals are one surface's, trusted or not, and face outwards at its outline:
+    directions that are mirrored, or lights exchanged, explain the plates as well. Near lights would need the surface's
+    distance for it; noise belongs to no surface, nor does a round that was not seen whole."""
     lights, whole = rig.select(plan.lights), observed.facts[-1].unseen_share <= MOST_UNSEEN
     if whole and len(lights) >= LEAST_LIGHTS and all(light.direction is not None for light in lights):
-        surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True, fill=False))).surface
+        surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True))).surface
         if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
             some = thin_surface(surface)
             observed.look_at_slopes(surface, some)
