@@ -99,6 +99,12 @@ def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_no
     assert [(line.grade, line.found) for line in said] == [("doubtful", "The files are tagged 'hlg'.")]
 
 
+@pytest.mark.parametrize(("stops", "first"), [(-5.5, result.EXPOSURE_FIRST), (-0.5, "")])
+def test_normals_of_a_dark_picture_lack_light_before_anything_else(stops: float, first: str) -> None:
+    """The picture was dark and was to be opened by 5 stops, and more light did not help."""
+    assert result.first_of_all(exposure(Footage(shape="waves", stops=stops, noise=0.0002).observed(0))) == first
+
+
 def test_ambient_light_that_is_the_same_everywhere_is_called_a_black_level() -> None:
     one = Footage().observed(0)
     one.facts = KeptFacts(replace(facts, ambient=0.3) for facts in one.facts)

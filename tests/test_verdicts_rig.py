@@ -199,7 +199,7 @@ def test_albedo_that_goes_with_the_slope_is_named_where_it_says_how_far_normals_
     else:
         (line,) = accuracy(one)
         assert ("other angles to the lens" in line.advice) == (slope_deg > 10), "it is the larger part of what is off"
-    assert all("another angle to the lens" in line.advice for line in said)
+    assert all("different angles to the lens" in line.advice for line in said)
 
 
 @pytest.mark.parametrize(("slope_deg", "named"), [(2.9, False), (3.1, True)])

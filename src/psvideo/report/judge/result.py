@@ -48,6 +48,7 @@ CLIPPING_FIRST = (
     "See the line on clipping first: what clips is no measurement, and more light clips more. Beyond that, place the "
     "lights nearer to the camera's axis, or use more of them, so that three reach every part."
 )
+EXPOSURE_FIRST = "See the line on exposure first: in a dark picture noise alone may turn normals that far."
 RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
 HALF = 0.5
 """From this share of what normals are off by on, albedo that goes with the slope is what shows it: more lights at the
@@ -57,8 +58,8 @@ GOES_WITH_SLOPE = (
     "everywhere (haze, flare, a bright room), the surface shines, or lamps are not as strong as the rig says"
 )
 BESIDE_THE_OTHERS = (
-    "These lights cannot tell which, nor take it off. One light more does that stands at another angle to the lens, "
-    "such as close beside it; or measure strengths on a white card (psvideo calibrate flat-field), clear the air and "
+    "These lights cannot tell which, nor take it off: six or more do that stand at different angles to the lens, one "
+    "of them close beside it. Or measure strengths on a white card (psvideo calibrate flat-field), clear the air and "
     "darken the room"
 )
 CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
@@ -88,6 +89,8 @@ def first_of_all(lines: Sequence[Judgement], *, curve_doubted: bool = False) -> 
     doubted = {one.subject for one in lines if one.grade in ("doubtful", "bad")}
     if curve_doubted:
         return CURVE_FIRST
+    if "exposure" in doubted:
+        return EXPOSURE_FIRST
     if "clipping" in doubted:
         return CLIPPING_FIRST
     return RIG_FIRST if "rig" in doubted else ""
@@ -145,8 +148,9 @@ def _trusting(observed: Observed) -> str:
     said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
     if _three(observed) and by_slope_deg(observed.facts) > COMMON_DEG:
         return (
-            f"Albedo {GOES_WITH_SLOPE}; or paint does so here. Three lights cannot tell. Use a fourth light, close "
-            'beside the lens or far from the others. `aov=["error"]` says how far off each pixel may be.'
+            f"Albedo {GOES_WITH_SLOPE}; or paint does so here. Three lights cannot tell. Use a fourth light, which "
+            "shows how far normals are off, or six or more at different angles to the lens, which take most of it off. "
+            '`aov=["error"]` says how far off each pixel may be.'
         )
     if off_deg(observed) is None and _steady(observed) and not said:
         return (

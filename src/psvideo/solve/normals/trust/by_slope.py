@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
-from psvideo.model.arrays import Doubles, Flags, Floats, Mask
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred
 
@@ -41,6 +41,8 @@ MOST_OUTLYING = 3.0
 """Where nothing was fitted, functions run away: beyond this many times their root mean square they count no more."""
 OF_PLACE = 0.5
 """What goes with the slope as it goes with the place may be a lens that darkens its corners: it counts by so much."""
+SURE = 3.0
+"""Of light that all lamps add counts what is more than so many standard errors."""
 OF_NOISE = 0.15
 """By so much of what noise does to normals of a matte ball their albedo goes with the slope all the same."""
 TYPICAL_OF_MEDIAN = 1.48
@@ -160,14 +162,9 @@ def _goes_with_slope(pairs: _Pairs) -> float:
 def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: _Pairs) -> Floats:
     """Return by how many degrees light turns every normal that all lamps add alike, (row, col): as much of it as makes
     albedo differ as it does. Lamps at one angle to an axis take such light for a vector along it, which stretches
-    normals that lean to it, and turns those that do not. Albedo may differ with the place as well, and what one half of
-    the subject does not tell of the other counts for nothing."""
+    normals that lean to it, and turns those that do not."""
     added = np.linalg.pinv(lit.directions) @ np.ones(len(lit.directions))
-    moves = _of_place(pairs.other) - _of_place(pairs.place)
-    changes = np.concatenate([pairs.changes[:, :3] @ added[:, None], moves], axis=1)
-    black = _black_squares(pairs)
-    each = [float(_robustly(changes[one], pairs.differs[one])[0][0]) for one in (black, ~black) if one.any()]
-    much = max(min(each), 0.0)
+    much = _surely(pairs, pairs.changes[:, :3] @ added)
     along = np.tensordot(added.astype(np.float32), points.planes, axes=1)
     across = np.sqrt(np.maximum(np.float32(added @ added) - along * along, np.float32(0)))
     return np.asarray(np.degrees(np.float32(much)) * across, np.float32)
@@ -177,7 +174,7 @@ def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
     """Return by how much each function counts in how albedo differs, and which share of what they explain functions
     of one half of the subject explain of the other."""
     numbers, weights = _robustly(changes, pairs.differs)
-    black = _black_squares(pairs)
+    black = (pairs.place / SQUARES).astype(np.intp).sum(axis=1) % 2 == 0
     by_other = np.empty_like(weights)
     for one in (black, ~black):
         by_other[~one] = changes[~one] @ _solved(changes[one], pairs.differs[one], weights[one])
@@ -188,9 +185,26 @@ def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
     return numbers, min(told / explained, 1.0) if explained > 0 else 0.0
 
 
-def _black_squares(pairs: _Pairs) -> Flags:
-    """Return which pairs lie in black squares of a chess board over the subject, (pair,)."""
-    return np.asarray((pairs.place / SQUARES).astype(np.intp).sum(axis=1) % 2 == 0)
+def _surely(pairs: _Pairs, stretches: Doubles) -> float:
+    """Return how many times by what ``stretches`` normals (pair,) albedo differs, less SURE standard errors: as the
+    subject's quarters agree on it, each by what its place leaves of that. Paint in large soft blobs goes with the slope
+    and the place of one quarter or another."""
+    moves = _of_place(pairs.other) - _of_place(pairs.place)
+    low, right = (pairs.place > np.median(pairs.place, axis=0)).T
+    found = list[tuple[float, float]]()
+    for one in (low & right, low & ~right, ~low & right, ~low & ~right):
+        if np.count_nonzero(one) < LEAST_PAIRS / 8:
+            return 0.0
+        numbers, weights = _robustly(np.concatenate([stretches[one, None], moves[one]], axis=1), pairs.differs[one])
+        root = np.sqrt(weights)
+        weighed, own = moves[one] * root[:, None], stretches[one] * root
+        left = own - weighed @ np.linalg.lstsq(weighed, own, rcond=None)[0]
+        found.append((float(numbers[0]), float((left**2).sum())))
+    each, counts = np.array(found).T
+    counts /= max(float(counts.sum()), 1e-12)
+    mean = float((counts * each).sum())
+    error = np.sqrt(len(each) / (len(each) - 1) * ((counts * (each - mean)) ** 2).sum())
+    return max(mean - SURE * float(error), 0.0)
 
 
 def _robustly(changes: Doubles, differs: Doubles) -> tuple[Doubles, Doubles]:
