@@ -219,10 +219,12 @@ def test_a_lamp_that_warms_up_is_named_and_not_said_to_flicker(by: float, word: 
     assert f"The light 'b' {word}" in said[0].found if word else "fire" in said[0].found
 
 
-def test_a_lamp_that_flickers_is_not_said_to_drift() -> None:
+@pytest.mark.parametrize("rounds", [6, 7, 8, 9])
+def test_a_lamp_that_flickers_is_not_said_to_drift(rounds: int) -> None:
+    """What check looks at is 5 to 8 rounds: of four lamps that flickered by 8 % three were to warm up."""
     rng = np.random.default_rng(4)
     for _ in range(40):
-        levels = 0.3 * (1 + 0.04 * rng.standard_normal((9, 3)) * [1, 0, 0])
+        levels = 0.3 * (1 + 0.04 * rng.standard_normal((rounds, 3)) * [1, 0, 0])
         said = lamps(Observed(lights=("a", "b", "c"), facts=steady_but(levels)))
         assert not any("grows" in line.found or "fades" in line.found for line in said)
 

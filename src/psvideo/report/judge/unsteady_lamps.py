@@ -14,6 +14,8 @@ UNSTEADY = 0.02
 DRIFTS, STEADILY = 0.05, 3.0
 """A lamp drifts that gives so much more or less in the last third of a take than in the first, beside what the others
 do, and so many times more than it changes from round to round: one that flickers does not."""
+FEW_ROUNDS = 9
+"""In fewer rounds a third of them is one or two, which flicker apart by chance: all steps must be the same way then."""
 ALIKE = 0.6
 """Lamps whose light changes together have this correlation from round to round; two that flicker have it by chance in
 one of eight takes of five rounds, three in one of thirty, four in one of a hundred."""
@@ -34,7 +36,7 @@ def unsteady(
     share = level / np.maximum(usual, 1e-9)
     change = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
     drift = _drift(share, alive)
-    drifts = alive & still.all() & (np.abs(drift) > np.maximum(DRIFTS, STEADILY * change))
+    drifts = alive & still.all() & _one_way(share) & (np.abs(drift) > np.maximum(DRIFTS, STEADILY * change))
     for light, by in zip(np.array(lights)[drifts].tolist(), drift[drifts].tolist(), strict=True):
         yield _drifting(light, by)
     flicker = alive & (change > UNSTEADY) & ~drifts
@@ -58,6 +60,13 @@ def _drift(share: Doubles, alive: Flags) -> Doubles:
     grown = np.median(share[-third:], axis=0) / np.maximum(np.median(share[:third], axis=0), 1e-9)
     common = float(np.median(grown[alive])) if alive.any() else 1.0
     return np.asarray(grown / max(common, 1e-9) - 1)
+
+
+def _one_way(share: Doubles) -> Flags:
+    """Return which lamps grow, or fade, from each of a few rounds to the next: ``share`` (round, light); all of them
+    where rounds are many."""
+    steps = np.diff(share, axis=0)
+    return np.asarray((steps > 0).all(axis=0) | (steps < 0).all(axis=0) | (len(share) >= FEW_ROUNDS))
 
 
 def _drifting(light: str, by: float) -> Judgement:
