@@ -19,12 +19,15 @@ from psvideo.sync.rowfit.coarse import retime
 from psvideo.sync.rowfit.coarse import seed as seed_module
 from psvideo.sync.rowfit.coarse.search import losses, turned_clocks
 from psvideo.sync.rowfit.coarse.seed import first_guess
+from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.normal_equations import solved
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import clock_through
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
+from psvideo.sync.verdict import believed
 from psvideo.sync.verdict.remarks import remarks
+from psvideo.sync.verdict.rivals import Rival
 from psvideo.synth import Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -188,6 +191,27 @@ def test_a_strobe_that_nearly_keeps_step_with_the_frames_is_no_noise(make_plan: 
     clock = TrueClock(phase_s=0.0123, offset_ppm=40.0)
     shot = expose(plates, plan, frames=40, clock=clock, noise=NOISE, bits=12)
     assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).phase_error_rows < 0.01
+
+
+def test_another_shutter_is_believed_where_it_leaves_clearly_less_of_the_whole_clip(
+    plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wrong curve makes any shutter that is free a little better. A few frames spoke for one of 187 degrees instead
+    of 173, and all flashes were 0.8 ms off."""
+    profiles = np.delete(filmed(plan), 20, axis=0)
+    rows = Profiles(
+        value=profiles,
+        index=np.arange(len(profiles)),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(float(ROWS)),
+        window_start=np.zeros(1, np.int64),
+    )
+    found = find(plan, rows)
+    better = replace(found, fit=replace(found.fit, rest=0.9 * found.fit.rest))
+    other = with_camera(plan, exposure_s=0.9 * plan.camera.exposure_s)
+    monkeypatch.setattr(believed, "best_rival", lambda *_, **__: Rival(plan=other, fault="shutter"))
+    monkeypatch.setattr(believed, "find", lambda tried, *_, **__: found if tried == plan else better)
+    assert believed.believed_fit(plan, rows).plan == plan
 
 
 def test_flashes_in_milliseconds_are_said_to_be_in_seconds(plan: Plan) -> None:

@@ -85,14 +85,14 @@ def _unless_elsewhere(verdict: Verdict) -> Verdict:
 
 
 def _as_meant(plan: Plan, rows: Profiles, found: ClipFit) -> tuple[Plan, ClipFit]:
-    """Return the likeliest plan with another camera and its fit, or the given ones where they are as good."""
+    """Return the likeliest plan with another camera and its fit; the given ones unless they leave clearly more."""
     leaves = CLEARLY if convincing(plan, found) else BETTER
     for rivals in (camera_rivals(plan), double_rivals(plan)):
         meant = best_rival(plan, rows, list(rivals), least=FAIR, leaves=leaves)
         if meant is not None:
             again = find(meant.plan, rows, measured=("exposure_s",) if meant.fault == "shutter" else ())
             gains = [gain_of(one.rows, one.fit.rest) for one in (found, again)]
-            if convincing(meant.plan, again) and gains[1] > gains[0]:
+            if convincing(meant.plan, again) and 1 - gains[1] < leaves * (1 - gains[0]):
                 return meant.plan, again
         if convincing(plan, found):
             break
