@@ -193,6 +193,20 @@ def test_motion_in_a_few_rounds_is_said() -> None:
     assert "In nine of ten rounds" in line.found
 
 
+@pytest.mark.parametrize(
+    ("trusted", "aligned", "foretold"), [(0.2, True, False), (None, True, True), (0.2, False, True)]
+)
+def test_what_motion_costs_is_foretold_only_where_the_take_does_not_show_it(
+    trusted: float | None, aligned: bool, foretold: bool
+) -> None:
+    """It said that 9 % were lost beside a line that 17 % are trusted."""
+    rounds = [facts_of(moving_share=0.3, speed_px_s=400.0, moving_valid_share=trusted) for _ in range(6)]
+    one = Observed(lights=("a",), facts=KeptFacts(rounds))
+    line = of_motion.motion(plan_of(("a",)), timing_of(), one, aligned=aligned)
+    assert "px from flash to flash" in line.found
+    assert ("of the normals there are lost" in line.found) is foretold
+
+
 def test_frames_with_values_that_are_no_numbers_are_judged_by_the_others() -> None:
     image = np.full((40, 40), 0.5, np.float32)
     image[0, 0] = np.nan

@@ -6,6 +6,7 @@ from psvideo.model.cost.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import NOTICED
+from psvideo.report.judge.of_what_moves import what_moves
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import LEAST_SHOWN_PX, Astray
 from psvideo.report.observe.observed import Observed
@@ -43,10 +44,18 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         subject="motion",
         grade="bad" if grave else "doubtful",
         found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
-        f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}." + _unfrozen(plan, timing, observed, speed),
+        f"({blur_px:.1f} px of blur within one){_cost(step_px, observed, aligned=aligned)}."
+        + _unfrozen(plan, timing, observed, speed),
         advice="Move slower, raise the frame rate or flash fewer lights"
         + (", or leave `align` at auto, which brings the plates together." if not aligned else "."),
     )
+
+
+def _cost(step_px: float, observed: Observed, *, aligned: bool) -> str:
+    """Say what so much motion usually costs, where the take does not show it itself: then that has its own line."""
+    if aligned and any(what_moves(observed.facts, aligned=True)):
+        return ""
+    return f": {cost_words(step_px)}"
 
 
 def _not_followed(share: float, *, aligned: bool, opened: bool) -> Judgement:
