@@ -1,5 +1,6 @@
 """What pieces leave for each other: notes that are read back as they were, folders that are one run's."""
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +66,18 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     assert np.array_equal(found.picture, picture)
     assert [(one.number, one.badness, one.why) for one in seen.thumbnails] == [(1003, 0.7, "67 % valid")]
     assert np.array_equal(seen.thumbnails[0].valid, valid)
+
+
+def test_every_number_that_was_noted_of_a_round_comes_back_and_follows_those_before(tmp_path: Path) -> None:
+    names = [one.name for one in fields(Observed) if one.type == list[float]]
+    assert {"slopes", "away", "outward", "in_shadow"} <= set(names)
+    one = Observed(lights=("a",))
+    for n, name in enumerate(names):
+        getattr(one, name).append(0.25 + n)
+    write_notes(tmp_path, range(3, 5), Found(observed=one))
+    ((_, found),) = noted(tmp_path)
+    one.followed_by(found.observed)
+    assert {name: getattr(one, name) for name in names} == {name: [0.25 + n] * 2 for n, name in enumerate(names)}
 
 
 def test_damaged_notes_are_refused_by_name(tmp_path: Path) -> None:
