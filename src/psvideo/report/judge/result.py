@@ -48,7 +48,7 @@ CLIPPING_FIRST = (
     "See the line on clipping first: what clips is no measurement, and more light clips more. Beyond that, place the "
     "lights nearer to the camera's axis, or use more of them, so that three reach every part."
 )
-EXPOSURE_FIRST = "See the line on exposure first: in a dark picture noise alone may turn normals that far."
+EXPOSURE_FIRST = "See the line on exposure first: noise alone may turn normals that far."
 RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
 HALF = 0.5
 """From this share of what normals are off by on, albedo that goes with the slope is what shows it: more lights at the
