@@ -28,7 +28,6 @@ from psvideo.report.observe.facts import FAINT, Dark, Seen, instant_facts, thinn
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import BINS, Levels, count_levels
-from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 from psvideo.report.observe.rig_and_curve.outward import outward
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.rigpoints import PointLight, RigPoints
@@ -37,13 +36,12 @@ from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
 from psvideo.report.observe.shadow import shadow_light
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
+from psvideo.report.observe.watched_motion import WatchedMotion
 from psvideo.report.observe.worst import Thumbnail, Worst
 
 UNEVEN = 0.5
 """A picture of things that are brighter and darker, or turned from the light, holds less than this where it is dim, of
 what it holds where it is bright."""
-WEAK_BESIDE = 1 / 8
-"""Motion and sharpness are looked for under the first light, unless it gives less than this of the brightest."""
 
 
 def _evenness(image: NDArray[np.float32]) -> float:
@@ -66,24 +64,20 @@ class Observed:
     without a dark slot; ``in_shadow`` which share of a lamp's light is left where it cannot reach.
     ``dark_evenness`` is, round by round, ambient light where it is dim beside that where it is bright; 0 where the
     lights' own pictures are even, for then nothing shows what it falls on.
-    ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
-    plate.
+    ``first`` is the number of the clip's first round.
     ``noises`` are how far the subject's light stands out of the plates' noise.
     ``turn`` is how frames, which lie as the sensor read them, were turned to stand upright, as plates do.
     ``stills`` says that the pictures of a round are photographs, each under its own light; ``astray`` is by how far
     they lie apart.
-    ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
-    where the first gives hardly any light in the first round (``watch_brightest``).
+    ``motion`` is what moves between the plates of one light, as they pass.
     """
 
     lights: tuple[str, ...]
-    watched: str = ""
     masks: Masks | None = None
     lens: Lens | None = None
     points: RigPoints | None = None
     only: range | None = None
     first: int | None = None
-    white: float | None = None
     stills: bool = False
     turn: Turn = UPRIGHT
     facts: KeptFacts = field(default_factory=KeptFacts)
@@ -101,13 +95,9 @@ class Observed:
     beyond_mask: "array[float]" = field(default_factory=_numbers)
     dark_evenness: "array[float]" = field(default_factory=_numbers)
     worst: Worst = field(default_factory=Worst)
-    _first: dict[str, Glimpse] = field(default_factory=dict)
-    _glimpse: Glimpse | None = None
+    motion: WatchedMotion = field(default_factory=WatchedMotion)
     _sample: Sample | None = None
     _dark: Dark | None = None
-    _moving: Motion | None = None
-    _moving_before: Motion | None = None
-    _before_s: float = 0.0
     _passed: bool = False
     _fit: tuple[tuple[int, bytes], RigFit | None] | None = field(default=None, init=False)
     """What the rig's fit was asked of, so many rounds and these lights, and what came out: a report asks three times,
@@ -117,22 +107,9 @@ class Observed:
         """Look at a plate before it is moved to one instant: motion is seen in those of one light, and ambient
         light in the dark slots."""
         self._passed = True
-        self._glance(plate)
+        self.motion.glance(plate, self.lights)
         if plate.light == AMBIENT:
             self._look_at_dark(plate)
-
-    def watch_brightest(self) -> None:
-        """Choose whose plates motion is looked for in from now on, by those that were seen so far: the first light's
-        unless it is weak beside the brightest."""
-        if self.watched or not self._first:
-            return
-        light = max(self._first, key=lambda one: self._first[one].white)
-        first = self.lights[0]
-        if first in self._first and self._first[first].white >= WEAK_BESIDE * self._first[light].white:
-            light = first
-        self.watched, self._glimpse = light, self._first[light]
-        self.white = self._glimpse.white
-        self._first.clear()
 
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames showed without a dark slot."""
@@ -171,11 +148,11 @@ class Observed:
             self.dark_evenness.append(_evenness(shown) if _evenness(seen.bright.max(axis=0)) < UNEVEN else 0.0)
         if not self._passed:
             for plate in one.plates:
-                self._glance(plate)
-        self.watch_brightest()
+                self.motion.glance(plate, self.lights)
+        self.motion.watch_brightest(self.lights)
         yield
         some = None if surface is None else thin_surface(surface)
-        moving, changed, stirs = self._moving, self._change(surface, some), self._stirring(one.time_s)
+        moving, changed, stirs = self.motion.latest, self._change(surface, some), self.motion.stirring(one.time_s)
         facts = instant_facts(
             one, surface, mask, changed, seen=seen, some=some, moving=moving, stirs=stirs, dark=self._dark
         )
@@ -244,7 +221,7 @@ class Observed:
 
     def _looking_closely(self, one: Round, surface: Surface | None, some: Surface | None, seen: Seen) -> Iterator[None]:
         yield
-        watched = next((plate for plate in one.plates if plate.light == self.watched), one.plates[0])
+        watched = next((plate for plate in one.plates if plate.light == self.motion.watched), one.plates[0])
         blur_px = sharpest_blur_px(middle_of(watched.picture))
         if blur_px is not None:
             self.blurs_px.append(blur_px)
@@ -300,33 +277,6 @@ class Observed:
         found = shadow_light(seen.bright, seen.shown, surface, ways, step=step)
         if found is not None:
             self.in_shadow.append(found)
-
-    def _glance(self, plate: LightPlate) -> None:
-        """Look for motion in a plate; of the first round, keep what it is told from."""
-        if not self.watched and plate.light in self._first:
-            self.watch_brightest()
-        if not self.watched and plate.light in self.lights:
-            self._first[plate.light] = glimpse(plate)
-        elif plate.light == self.watched:
-            self._look_for_motion(plate)
-
-    def _look_for_motion(self, plate: LightPlate) -> None:
-        before = self._glimpse
-        self._glimpse = glimpse(plate, self.white)
-        self.white = self._glimpse.white
-        self._moving_before, self._moving = self._moving, None
-        if before is not None:
-            self._moving, self._before_s = motion_between(before, self._glimpse), before.time_s
-
-    def _stirring(self, time_s: float) -> Flags | None:
-        """Return what moves at an instant, of the glimpses' pixels: what changed until then and changes from then on,
-        where the next plate was seen already; else what changed until then, with what came out from behind."""
-        if self._moving is None or self._moving.changed is None or self._glimpse is None:
-            return None
-        latest, before = self._moving.changed, self._moving_before
-        if before is None or time_s > (self._before_s + self._glimpse.time_s) / 2:
-            return latest
-        return None if before.changed is None else latest & before.changed
 
     def _change(self, surface: Surface | None, some: Surface | None) -> Change | None:
         before, self._sample = self._sample, None if surface is None else sample_of(surface, some)

@@ -20,6 +20,7 @@ from psvideo.report.judge.every_line import judgements
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
+from psvideo.report.observe.watched_motion import WatchedMotion
 from psvideo.report.run_report import LightFacts, RunReport, report_record
 from psvideo.runs.steps.levels import levels_of
 from psvideo.runs.steps.lighting import Lighting
@@ -59,7 +60,7 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
     watched = "" if take.unmixing is None else slot_names(clip.plan)[0]
     return Observed(
         lights=clip.plan.lights,
-        watched=watched,
+        motion=WatchedMotion(watched=watched),
         masks=masks,
         points=points,
         lens=Lens.of(rig, **size),

@@ -16,6 +16,7 @@ from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
 from psvideo.plates.spread import rounds_spread
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.watched_motion import WatchedMotion
 from psvideo.runs.delivery.delivering import surface_job, write_plates, write_specular
 from psvideo.runs.delivery.look import SAMPLE_ROUND, instant_sheet
 from psvideo.runs.delivery.relit import blur_of
@@ -49,7 +50,8 @@ def write_instants(
     if piece is not None:
         observed.only = piece.numbers
     if beginning is not None:
-        observed.first, observed.watched, observed.white = beginning.number, beginning.watched, beginning.white
+        observed.first = beginning.number
+        observed.motion = WatchedMotion(watched=beginning.watched, white=beginning.white)
     shaping = kept_beside(job.shaping if beginning is None else beginning.shaping, folder)
     found = Found(observed=observed)
     ambient = first_ambient(job.take, job.timing) if job.mixes_ambient else None
@@ -160,12 +162,12 @@ def beginning_of(job: Job) -> Beginning | None:
     observed = observing(take, job.lighting.rig, job.lighting.masks)
     for instant in instants_of(replace(job, take=take), observed, part=part):
         shaping, _ = shape_of(job.shaping, job.lighting, instant)
-        observed.watch_brightest()
+        observed.motion.watch_brightest(observed.lights)
         return Beginning(
             number=instant.round.number,
             whites=dict(part.whites),
-            watched=observed.watched,
-            white=observed.white,
+            watched=observed.motion.watched,
+            white=observed.motion.white,
             shaping=shaping,
         )
     return None
