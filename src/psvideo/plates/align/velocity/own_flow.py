@@ -15,7 +15,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.flow import changed, comparable, flow_from, pixel_places
 from psvideo.plates.align.velocity.followed import Pair, mean_over
-from psvideo.plates.align.velocity.moving_kernel import arriving_rows
+from psvideo.plates.align.velocity.moving_kernel import UNLIKE_SQUARE, arriving_rows
 
 AROUND_PX, SMOOTH_PX, EDGE_PX = 5, 0.6, 1.0
 """Change is smoothed by the second, and held against the most of it within the first, smoothed by the third."""
@@ -25,8 +25,6 @@ LEAST_CODES = 5.0
 """Where nothing around changes by more codes nothing is taken out."""
 FILL_PX = 1.0
 """Gaps are filled by means with such a spread."""
-NOISE_SQUARE = np.float32(4.0**2)
-"""Codes that differ by 4 along a way count half as much against it as all that is left: noise makes 1 to 2."""
 CONNECTED_PX, BY_CHANCE, SURELY = 9, np.float32(0.2), np.float32(0.4)
 """Flow finds a way even for snow, whose pixels change each by itself. Over a window of so many pixels the change of one
 correlates with its neighbour's, in the direction where it does so the most, by 0.1 then, and less than the second 4
@@ -75,7 +73,7 @@ class OwnFlow:
     def _alike(self, way: Floats, time_s: float) -> Floats:
         one = _at(self.before, way, time_s - self.pair.before.time_s)
         other = _at(self.after, way, time_s - self.pair.after.time_s)
-        return np.asarray(1 / np.sqrt((other - one) ** 2 + NOISE_SQUARE), np.float32)
+        return np.asarray(1 / np.sqrt((other - one) ** 2 + UNLIKE_SQUARE), np.float32)
 
 
 @dataclass(kw_only=True)
