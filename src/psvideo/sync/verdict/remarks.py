@@ -128,8 +128,8 @@ def _wrong_readout(planned_s: float, readout_s: float, error_s: float) -> str:
         return (
             f"The plan's readout runs the wrong way: {found}, and the plan says {_direction(planned_s)}. Put readout_s "
             f"= {readout_s:.6g} into plan.toml. Or the picture was turned by 180 degrees, or mirrored top to bottom, "
-            "after it was taken: then turn the rig's lights as well, for normals show that they are not only where the "
-            "subject stands free."
+            "after it was taken: then turn the rig's lights as well. Normals of lights that were not turned look wrong "
+            "only where the subject stands free."
         )
     if planned_s == 0:
         fault = f"The plan's camera has a global shutter, but the picture shows a rolling readout: {found}"
