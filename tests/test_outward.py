@@ -65,8 +65,13 @@ def solved(shape: tuple[Array, Mask], ways: Array, claimed: Array) -> tuple[list
     return plates, Solving(error=True).solve(plates, lit, mask=inside)
 
 
+def found_of(plates: list[NDArray[np.float32]], surface: Surface, subject: Mask) -> float | None:
+    return outward(thin_surface(surface), thinned(subject), thinned(np.max(plates, axis=0)))
+
+
 def facing(shape: tuple[Array, Mask], ways: Array, claimed: Array) -> float | None:
-    return outward(thin_surface(solved(shape, ways, claimed)[1]), thinned(shape[1]))
+    plates, surface = solved(shape, ways, claimed)
+    return found_of(plates, surface, shape[1])
 
 
 @pytest.mark.parametrize("lights", [3, 5])
@@ -97,11 +102,17 @@ def test_what_meets_its_outline_facing_the_camera_says_nothing(shape: tuple[Arra
 def test_where_the_picture_ends_or_an_outline_faces_one_way_nothing_is_said() -> None:
     ways = ring(3, 30)
     normals, inside = ball()
-    surface = solved((normals, inside), ways, ways)[1]
-    assert outward(thin_surface(surface), thinned(np.ones((SIZE, SIZE), np.bool_))) is None
+    assert found_of(*solved((normals, inside), ways, ways), np.ones((SIZE, SIZE), np.bool_)) is None
     cut = slice(SIZE * 3 // 4, None)  # the picture ends within the ball, and its right side is in it
-    part = solved((normals[:, cut], inside[:, cut]), ways, ways)[1]
-    assert outward(thin_surface(part), thinned(inside[:, cut])) is None
+    assert found_of(*solved((normals[:, cut], inside[:, cut]), ways, ways), inside[:, cut]) is None
+
+
+def test_where_a_mask_cuts_through_a_body_light_goes_on_and_nothing_is_said() -> None:
+    ways = ring(3, 30)
+    plates, surface = solved(ball(), ways, ways)
+    strip = (np.abs(X - 0.7) < 0.2) & (np.abs(Y) < 0.55)
+    assert found_of(plates, surface, strip) is None
+    assert outward(thin_surface(surface), thinned(strip), thinned(strip).astype(np.float32)) is not None
 
 
 def said_of(shape: tuple[Array, Mask], ways: Array, claimed: Array, *, guessed: bool = False) -> Judgement:

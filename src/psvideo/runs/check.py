@@ -222,7 +222,7 @@ def _look_at_normals(observed: Observed, one: Round, plan: Plan, rig: Rig) -> No
         if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
             some = thin_surface(surface)
             observed.look_at_slopes(surface, some)
-            observed.look_at_outline(some, thinned_round(one, None).subject)
+            observed.look_at_outline(some, thinned_round(one, None))
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:

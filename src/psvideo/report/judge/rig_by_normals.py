@@ -22,7 +22,7 @@ MOST_AWAY = 0.05
 OUTWARD, SURELY_OUTWARD = 0.55, 0.7
 """At outlines normals of right rigs face outwards by a cosine of 0.69 to 1 in the mean: 205 sets of 3 to 12 lights of
 seven photographed and rendered subjects. Where two of three lights are exchanged, or all three go round, it was below
-the first in 206 of 210, 0.72 at most; in 21 of these slopes agreed as a surface's do."""
+the first in 205 of 210, 0.72 at most; in 21 of these slopes agreed as a surface's do."""
 HARDLY, INSIDE_OUT = 0.4, -0.7
 """Below the first nothing but the rig explains it; below the second normals face inwards everywhere."""
 LEANS_DEG, BY_LEANING = 6.0, 0.1
@@ -80,8 +80,7 @@ def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
         return Judgement(
             subject="rig",
             grade=grade,
-            found=f"{cannot}: {_why_of_three(observed)}, which three lights do not tell apart."
-            f"{_as_it_is_seen(observed)}",
+            found=f"{cannot}: {_why_of_three(observed)}{_as_it_is_seen(observed)}",
             advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
             "lights as the plan does. If it does, add lights.",
         )
@@ -95,12 +94,10 @@ def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
 
 
 def _why_of_three(observed: Observed) -> str:
+    apart = "much of the surface shines or lies in shadow, which three lights do not tell apart."
     if faces_outwards(observed):
-        return (
-            "much of the surface shines or lies in shadow, or directions are off. Lights are hardly exchanged, for "
-            "normals face outwards where the subject ends"
-        )
-    return "directions are mirrored or turned, lights exchanged, or much of the surface shines or lies in shadow"
+        return f"directions are off, or {apart} Lights are hardly exchanged: normals face outwards at the outline."
+    return f"directions are mirrored or turned, lights exchanged, or {apart}"
 
 
 def _as_it_is_seen(observed: Observed) -> str:
@@ -138,8 +135,8 @@ def facing_inwards(observed: Observed, *, guessed: bool) -> Judgement | None:
     return Judgement(
         subject="rig",
         grade="doubtful" if facing > HARDLY else "bad",
-        found=f"{inwards} (cosine {facing:.2f} in the mean, of such 0.7 and more): two lights are exchanged, "
-        f"directions are mirrored or turned, or strengths far off.{_as_it_is_seen(observed)}",
+        found=f"{inwards} (mean cosine {facing:.2f}; 0.7 and more is right): two lights are exchanged, directions are "
+        f"mirrored or turned, or strengths are far off.{_as_it_is_seen(observed)}",
         advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, names the lights as "
         "the plan does, and says how strong they are.",
     )

@@ -20,9 +20,7 @@ def three_lights(observed: Observed) -> Judgement:
     """Say what three lights do not show, and what strengths that are off would cost."""
     as_well = "other strengths or with two lights exchanged as well."
     if faces_outwards(observed):
-        as_well = (
-            "other strengths as well. Lights are hardly exchanged, for normals face outwards where the subject ends."
-        )
+        as_well = "other strengths as well. Lights are hardly exchanged: normals face outwards where the subject ends."
     found = (
         "Whether the rig is right is not known: the normals fit together as one surface's, and under three lights they "
         f"mostly do so with {as_well}"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Masks
 from psvideo.compute.ranks import quantile
-from psvideo.model.arrays import Flags, Integers
+from psvideo.model.arrays import Integers
 from psvideo.model.channels import brightest_channel
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Surface
@@ -236,7 +236,7 @@ class Observed:
             found = lean(small, lens=self.lens)
             if found is not None:
                 self.leans.append(found)
-            self.look_at_outline(thin_surface(surface) if some is None else some, seen.subject)
+            self.look_at_outline(thin_surface(surface) if some is None else some, seen)
             yield
             self._look_into_shadow(one, surface, seen)
         if self.points is not None and one.lights == self.lights:
@@ -254,9 +254,9 @@ class Observed:
         self.away.append(share_away(surface, some))
         return small
 
-    def look_at_outline(self, some: Surface, subject: Flags) -> None:
-        """Look whether normals face outwards where the ``subject`` ends; ``some`` is the surface, both thinned."""
-        faces = outward(some, subject)
+    def look_at_outline(self, some: Surface, seen: Seen) -> None:
+        """Look whether normals face outwards where the subject ends; ``some`` is the surface, thinned."""
+        faces = outward(some, seen.subject, seen.bright.max(axis=0))
         self.outward += [] if faces is None else [faces]
 
     def _look_at_places(self, one: Round, seen: Seen, points: RigPoints) -> None:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.model.surface import Surface
 
 STEEP = 0.6
@@ -22,21 +22,25 @@ CLEAR = 0.12
 LEAST_POINTS, LEAST_SHARE = 40, 0.5
 """So many points at the outline must be steep, and this share of those that three lights reach: where a mask cuts
 through a relief, 0.3 are. (Of bodies that stand free 0.6 and more, under any rig.)"""
+BEYOND, DARKER = 4.0, 0.5
+"""So many points beyond the outline there is less than this share of the light in it: else a mask cuts the subject."""
 ALL_AROUND = 0.7
 """Outlines that face one way tell little: their mean direction is shorter than this."""
 
 
-def outward(some: Surface, subject: NDArray[np.bool_]) -> float | None:
+def outward(some: Surface, subject: NDArray[np.bool_], light: NDArray[np.float32]) -> float | None:
     """Return the mean cosine between steep normals at the subject's outline and the way out: 1 for a body that stands
     free, about 0 under lights that are exchanged, -1 for a bowl. None where too little of an outline shows.
 
-    some: a surface, thinned as the ``subject`` (row, col) is. Where the picture ends the subject does not.
+    some: a surface, thinned as the ``subject`` (row, col) is, and the brightest ``light`` of any lamp (row, col). Where
+    the picture ends the subject does not.
     """
     away, right, up = _ways_out(subject)
     slope = np.hypot(right, up)
     normals = some.normals.astype(np.float32)
     leaning = np.hypot(normals[..., 0], normals[..., 1])
     rim = subject & some.measured & (away <= NEAR) & (slope > CLEAR)
+    rim[rim] = _ends(light, rim, right[rim] / slope[rim], up[rim] / slope[rim])
     at = rim & (leaning > STEEP)
     if at.sum() < max(LEAST_POINTS, LEAST_SHARE * rim.sum()):
         return None
@@ -44,6 +48,16 @@ def outward(some: Surface, subject: NDArray[np.bool_]) -> float | None:
     if np.hypot(*ways.mean(axis=1)) > ALL_AROUND:
         return None
     return float((ways * normals[at][:, :2].T / leaning[at]).sum(axis=0).mean())
+
+
+def _ends(
+    light: NDArray[np.float32], rim: NDArray[np.bool_], right: Doubles | Floats, up: Doubles | Floats
+) -> NDArray[np.bool_]:
+    """Return whether light ends beyond the points of a rim, in the ways out of it: where it goes on, a body may."""
+    rows, cols = np.nonzero(rim)
+    beyond = np.rint(rows - BEYOND * up).astype(np.intp), np.rint(cols + BEYOND * right).astype(np.intp)
+    there = light[tuple(np.clip(at, 0, size - 1) for at, size in zip(beyond, light.shape, strict=True))]
+    return np.asarray(there < np.float32(DARKER) * light[rows, cols])
 
 
 def _ways_out(subject: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
