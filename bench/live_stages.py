@@ -20,6 +20,7 @@ from psvideo.live.showing.newest_result import GRID_PX, NewestRound
 from psvideo.live.showing.newest_round import LiveRounds
 from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.live.watching import LOOK_S, Watching
+from psvideo.model.camera import Camera
 from psvideo.model.rows.row_profiles import row_light
 from psvideo.model.timing import timed_camera
 from psvideo.solve.instants import surfaces
@@ -110,8 +111,13 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
             place=frame.index,
             ended=frame.index,
         )
-        pictures.put(newest, timed_camera(small, timing))
-        spent.on("packed for the page", partial(pictures.packed, "key"))
+        spent.on("packed for the page", partial(_show, pictures, newest, timed_camera(small, timing)))
         watching._looked_s = float("-inf")
         spent.on("judged (now and then)", partial(watching.look, newest, small))
     return spent
+
+
+def _show(pictures: NewestPictures, newest: NewestRound, camera: Camera) -> None:
+    """What a page asked for before is packed as a result is put in, the first time as it is asked for."""
+    pictures.put(newest, camera)
+    pictures.packed("key")
