@@ -12,7 +12,8 @@ from psvideo.sync.black_frames import remarks_on_black
 from psvideo.sync.flashes_seen import timing_of_fit
 from psvideo.sync.marks import marks_of
 from psvideo.sync.named_strobe import FoundStrobe
-from psvideo.sync.unfired import only_fired, remarks_on_unfired
+from psvideo.sync.unfired import only_fired
+from psvideo.sync.unfired_words import remarks_on_unfired
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
 from psvideo.sync.verdict.swinging import swing_of
