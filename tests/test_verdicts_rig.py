@@ -136,6 +136,24 @@ def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_ex
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_an_upright_pipe_beside_a_ball_speaks_for_no_lens_and_against_no_rig(seed: int) -> None:
+    rows, cols = 180, 320
+    x, y = np.mgrid[:rows, :cols][1] - 159.5, 89.5 - np.mgrid[:rows, :cols][0]
+    ball, pipe = np.hypot(x + 78, y) < 62, (np.abs(x - 75) < 50) & (np.abs(y) < 70)
+    across = np.where(ball, (x + 78) / 62, np.where(pipe, (x - 75) / 50, 0))
+    up = np.where(ball, y / 62, 0)
+    noise = np.where(pipe, 0.03, 0.003)[..., None] * np.random.default_rng(seed).standard_normal((rows, cols, 3))
+    normals = np.stack([across, up, np.sqrt(1 - across**2 - up**2)], axis=-1) + noise
+    normals = (normals / np.linalg.norm(normals, axis=-1, keepdims=True)).astype(np.float32)
+    surface = Surface(normals=normals, albedo=np.ones((rows, cols, 1), np.float32), valid=ball | pipe)
+    found = lean(coarse_normals(surface))  # a pipe fits any lens: every lens with a tilt of its own
+    assert found is not None
+    one = Footage(solved=True).observed(0)
+    one.leans[:] = [found]
+    assert {line.grade for line in rig_of(one)} == {"good"}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> None:
     satin = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(seed)
     fit = satin.rig_fit

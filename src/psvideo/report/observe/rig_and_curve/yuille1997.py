@@ -103,8 +103,9 @@ def lean(small: Averaged, *, lens: Lens | None = None) -> Lean | None:
     found = _through(seen, lens, near=free)
     shifted, nearly = _shifted(seen, lens, found)
     left = _through(seen, shifted, near=nearly)
+    gain = min(found.gain, _over_as_they_are(seen, lens, found, far, by_lens))
     return replace(
-        _described(found.rows, found.gain, n),
+        _described(found.rows, gain, n),
         off_axis=float(np.hypot(shifted.right, shifted.up)),
         least_deg=_described(left.rows, left.gain, n).lean_deg,
     )
@@ -114,6 +115,18 @@ def _through(seen: "_Bending", lens: Lens, *, near: "_Fitted | None" = None) -> 
     """Find the change that makes normals a surface's that was seen through a lens; ``near`` is one not far from it."""
     crossed = _crossed(*_in_view(seen.normals, seen.ways, seen.x - lens.right, seen.y - lens.up, lens.width))
     return _fitted(crossed, None, near=near)
+
+
+def _over_as_they_are(seen: "_Bending", lens: Lens, found: "_Fitted", far: Doubles, by_lens: Doubles) -> float:
+    """Return the gain of what was ``found`` through a lens over normals as they are through the lens that suits these:
+    what bends one way only (a pipe) fits any lens, each with a lean of its own, and noise chooses among them."""
+    still, slope = far[0] + far[4], by_lens[0] + by_lens[4]
+    own, _, _ = _reweighted(slope[None], still, np.zeros(1))
+    suits = Lens(width=float(np.clip(own[0], 0, WIDEST)))
+    as_they_are = _crossed(*_in_view(seen.normals, seen.ways, seen.x, seen.y, suits.width))
+    leaning = _crossed(*_in_view(seen.normals, seen.ways, seen.x, seen.y, lens.width))
+    left = np.einsum("ij,ijp->p", found.rows, leaning.reshape(2, 3, -1))
+    return _gain(left, as_they_are[0] + as_they_are[4], _wide(left))
 
 
 def _shifted(seen: "_Bending", lens: Lens, found: "_Fitted") -> "tuple[Lens, _Fitted]":
@@ -202,10 +215,19 @@ def _fitted(crossed: Doubles, more: Doubles | None, *, near: _Fitted | None = No
     elif len(still) >= FEWER * LEAST_PIXELS:
         found, _, _ = _reweighted(slopes[:, ::FEWER].copy(), still[::FEWER].copy(), found)
     found, left, width = _reweighted(slopes, still, found)
-    cost, none = (float(np.mean(np.log1p((one / width) ** 2))) for one in (left, still))
     a, b, c, d, e = found[:5]
     rows = np.array([[1 + a, b, c], [d, 1 - a, e]])
-    return _Fitted(rows=rows, more=float(found[-1]), gain=none / max(cost, 1e-12) - 1)
+    return _Fitted(rows=rows, more=float(found[-1]), gain=_gain(left, still, width))
+
+
+def _gain(left: Doubles, still: Doubles, width: float) -> float:
+    """Return by how much less is ``left`` (point,) than ``still`` was, as a share, for residuals so wide."""
+    cost, none = (float(np.mean(np.log1p((one / width) ** 2))) for one in (left, still))
+    return none / max(cost, 1e-12) - 1
+
+
+def _wide(left: Doubles) -> float:
+    return OUTLIER * median(np.abs(left)) / NORMAL_MEDIAN + 1e-12
 
 
 def _reweighted(slopes: Doubles, still: Doubles, found: Doubles) -> tuple[Doubles, Doubles, float]:
@@ -213,7 +235,7 @@ def _reweighted(slopes: Doubles, still: Doubles, found: Doubles) -> tuple[Double
     leave, and how wide that is. ``slopes`` (unknown, point) is what each adds."""
     for _ in range(ROUNDS):
         left = still + np.einsum("ip,i->p", slopes, found)
-        width = OUTLIER * median(np.abs(left)) / NORMAL_MEDIAN + 1e-12
+        width = _wide(left)
         weighted = slopes / (1 + (left / width) ** 2)
         squares, pull = weighted @ slopes.T, np.einsum("ip,p->i", weighted, still)  # BLAS would cut sums by threads
         before, found = found, -_solved(squares, pull)
