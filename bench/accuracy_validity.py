@@ -20,7 +20,7 @@ from bench.accuracy_measure import (
     turned,
     washington,
 )
-from psvideo.report.judge.result import MEAN_OF_HELD
+from psvideo.report.judge.typical_error import MEAN_OF_HELD
 from psvideo.solve.normals.solving import Solving
 
 OWN_LIGHTS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 2, 4, 5, 7), 8: tuple(range(8))}

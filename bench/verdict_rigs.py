@@ -19,11 +19,13 @@ from psvideo.model.rig import Light, Rig
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
+from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_rig import rig
-from psvideo.report.judge.result import accuracy, off_deg, validity
+from psvideo.report.judge.of_validity import validity
+from psvideo.report.judge.typical_error import off_deg
 from psvideo.report.judgement import verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points

@@ -18,7 +18,7 @@ from bench.accuracy_measure import SHARED_DATA, angles_deg, diligent_lights, was
 from bench.table import Row, table
 from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.model.rig import Light, Rig
-from psvideo.report.judge.result import MEAN_OF_HELD
+from psvideo.report.judge.typical_error import MEAN_OF_HELD
 from psvideo.report.run_report import RunReport
 
 EIGHT, TWELVE = (4, 19, 27, 44, 52, 67, 75, 91), (1, 8, 18, 24, 37, 41, 50, 59, 66, 79, 85, 94)

@@ -15,8 +15,8 @@ from psvideo.model.surface import Misfit
 from psvideo.model.timing import Timing
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judge.of_motion import motion
-from psvideo.report.judge.result import accuracy
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import Astray, astray
 from psvideo.report.observe.alignment.part_places import PartPlaces, places_of_parts

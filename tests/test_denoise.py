@@ -16,7 +16,7 @@ from psvideo.plates.align.denoise import Average, ResultNoise, averaged
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
-from psvideo.report.judge.result import steadiness
+from psvideo.report.judge.of_steadiness import steadiness
 from psvideo.report.observe.facts import InstantFacts, instant_facts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Misfit
+from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judge.of_rig import rig as judge_rig
-from psvideo.report.judge.result import MEAN_OF_HELD, accuracy
 from psvideo.report.judge.rig_by_plates import lights_exchanged
+from psvideo.report.judge.typical_error import MEAN_OF_HELD
 from psvideo.report.observe.alignment.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts

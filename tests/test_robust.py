@@ -13,7 +13,7 @@ from scipy.optimize import linprog  # type: ignore[attr-defined]
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.model.surface import Misfit, Surface
-from psvideo.report.judge.result import accuracy
+from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts

@@ -8,7 +8,7 @@ import pytest
 from judged_footage import SEEDS, Footage, accuracy, exposure, graded, lamps, rig_but_leaning, rig_of, validity
 
 from psvideo.model.surface import Misfit
-from psvideo.report.judge import result
+from psvideo.report.judge import of_steadiness, of_validity, typical_error
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.kept_facts import KeptFacts
@@ -72,12 +72,12 @@ LIT = [
     _by("ambient noticed", ambient, "ambient", {"ambient": [0.03, 0.06]}, {"ambient": [0.04, 0.08]}, rounds=6),
     _by("ambient measured", ambient, "ambient", {"measured": 0.82}, {"measured": 0.78}, ambient=[0.03]),
     _by("ambient faint", ambient, "ambient", {"ambient": [0.018]}, {"ambient": [0.023]}, measured=0.7),
-    _by("focus", result.focus, "focus", {"blur_px": 2.5}, {"blur_px": 3.2}, shape="tiles"),
+    _by("focus", of_steadiness.focus, "focus", {"blur_px": 2.5}, {"blur_px": 3.2}, shape="tiles"),
 ]  # fmt: skip
 
 
 def steadiness(one: Observed) -> list[Judgement]:
-    return list(result.steadiness(one.facts))
+    return list(of_steadiness.steadiness(one.facts))
 
 
 SOLVED = [
@@ -129,7 +129,7 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
     one = Footage().observed(0)
 
     def said(off_deg: float) -> tuple[str, str]:
-        misfit = Misfit(share=0.1, error_deg=off_deg / result.MEAN_OF_HELD)
+        misfit = Misfit(share=0.1, error_deg=off_deg / typical_error.MEAN_OF_HELD)
         one.facts = KeptFacts(replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0) for facts in one.facts)
         return graded(accuracy(one), "accuracy"), graded(validity(one), "validity")
 
@@ -141,11 +141,11 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
 @pytest.mark.parametrize(("noise_deg", "blamed"), [(3.9, "Move slower, raise"), (4.1, "Noise alone turns")])
 def test_where_noise_alone_spoils_normals_motion_is_not_blamed(noise_deg: float, blamed: str) -> None:
     one = Footage().observed(0)
-    misfit = Misfit(share=0.01, error_deg=6.0, noise_deg=noise_deg / result.MEAN_OF_HELD)
+    misfit = Misfit(share=0.01, error_deg=6.0, noise_deg=noise_deg / typical_error.MEAN_OF_HELD)
     one.facts = KeptFacts(
         replace(facts, misfit=misfit, valid_share=0.16, measured_share=0.98, moving_share=0.14) for facts in one.facts
     )
-    (lacking,) = result.validity(one)
+    (lacking,) = of_validity.validity(one)
     assert blamed in lacking.advice
 
 

@@ -24,7 +24,7 @@ from judged_footage import (
 
 from psvideo.model.camera import Encoding
 from psvideo.model.swing import Swing
-from psvideo.report.judge import result
+from psvideo.report.judge import of_accuracy
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_timing import timing_and_order
@@ -57,7 +57,7 @@ def test_among_many_lights_those_that_are_not_as_strong_as_the_rig_says_are_name
     assert (line.subject, line.grade) == ("rig", "doubtful")
     assert re.search(r"it would: 'light5' 8[1-4] %, 'light1' 1(1[7-9]|2[01]) % of what the rig says", line.found)
     assert not any("other strengths" in one.found for one in rig_of(right))
-    assert "not as strong" in " ".join(one.found for one in result.accuracy(off))
+    assert "not as strong" in " ".join(one.found for one in of_accuracy.accuracy(off))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -65,7 +65,7 @@ def test_strengths_are_told_beside_a_light_that_is_dead(seed: int) -> None:
     gains = [1.0, 1.3, 1.0, 0.0, 1.0, 0.75, 1.0, 1.0, 1.0]
     dead = Footage(shape="waves", lights=9, gains=gains, sheen=(0.2, 12), solved=True).observed(seed)
     assert any("'light5' 7" in one.found and "'light3'" not in one.found for one in rig_but_leaning(dead))
-    assert "not as strong" in " ".join(one.found for one in result.accuracy(dead))
+    assert "not as strong" in " ".join(one.found for one in of_accuracy.accuracy(dead))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -78,7 +78,7 @@ def test_strengths_are_told_beside_a_light_that_the_rig_calls_weak(share: float,
         for own in (gains, [share] + [1.0] * 7)
     )
     assert any("'light3' 8" in one.found and "'light0'" not in one.found for one in rig_but_leaning(off))
-    assert "not as strong" in " ".join(one.found for one in result.accuracy(off))
+    assert "not as strong" in " ".join(one.found for one in of_accuracy.accuracy(off))
     assert right.rig_fit is not None
     assert not any("not as strong" in one.found or "other strengths" in one.found for one in rig_of(right))
 

@@ -30,7 +30,7 @@ from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round
-from psvideo.report.judge import of_motion, result
+from psvideo.report.judge import of_motion, of_validity, typical_error
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
@@ -87,22 +87,22 @@ def test_a_subject_that_clips_everywhere_is_called_so_and_is_told_to_look_again(
 
 def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_not_blamed() -> None:
     one = Footage().observed(0)
-    misfit = Misfit(share=0.1, error_deg=3.1 / result.MEAN_OF_HELD)
+    misfit = Misfit(share=0.1, error_deg=3.1 / typical_error.MEAN_OF_HELD)
     one.facts = KeptFacts(
         replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0, moving_share=1.0) for facts in one.facts
     )
-    (lacking,) = result.validity(one)
+    (lacking,) = of_validity.validity(one)
     assert "Move slower" in lacking.advice
-    (lacking,) = result.validity(one, first=result.first_of_all((), curve_doubted=True))
-    assert lacking.advice == result.CURVE_FIRST
+    (lacking,) = of_validity.validity(one, first=of_validity.first_of_all((), curve_doubted=True))
+    assert lacking.advice == of_validity.CURVE_FIRST
     said = list(judge_rig(one, curve_doubt="the files are tagged 'hlg'"))
     assert [(line.grade, line.found) for line in said] == [("doubtful", "The files are tagged 'hlg'.")]
 
 
-@pytest.mark.parametrize(("stops", "first"), [(-5.5, result.EXPOSURE_FIRST), (-0.5, "")])
+@pytest.mark.parametrize(("stops", "first"), [(-5.5, of_validity.EXPOSURE_FIRST), (-0.5, "")])
 def test_normals_of_a_dark_picture_lack_light_before_anything_else(stops: float, first: str) -> None:
     """The picture was dark and was to be opened by 5 stops, and more light did not help."""
-    assert result.first_of_all(exposure(Footage(shape="waves", stops=stops, noise=0.0002).observed(0))) == first
+    assert of_validity.first_of_all(exposure(Footage(shape="waves", stops=stops, noise=0.0002).observed(0))) == first
 
 
 def test_ambient_light_that_is_the_same_everywhere_is_called_a_black_level() -> None:
@@ -226,7 +226,7 @@ def test_a_clipped_take_is_not_told_to_give_more_light(clip: float) -> None:
     (lacking,) = (line for line in lines if line.subject == "validity")
     assert lacking.grade != "good"
     assert ("more light," in lacking.advice) == (clip < 0.02)
-    assert (lacking.advice == result.CLIPPING_FIRST) == (clip > 0.02)
+    assert (lacking.advice == of_validity.CLIPPING_FIRST) == (clip > 0.02)
 
 
 def _quantised(step: int) -> tuple[list[np.ndarray], float]:

@@ -21,7 +21,7 @@ from judged_footage import (
 
 from psvideo.model.surface import Misfit, Surface
 from psvideo.model.turn import CLOCKWISE, UPRIGHT
-from psvideo.report.judge import result
+from psvideo.report.judge import of_accuracy, of_validity
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judge.rig_of_three import STRONGER, turned_deg
@@ -193,7 +193,7 @@ def test_what_is_not_known_of_near_lights_distance_is_said_and_not_laid_upon_the
     one = Footage().observed(0)
     misfit = Misfit(share=0.01, error_deg=1.0, distance_share=share)
     one.facts = KeptFacts(replace(facts, misfit=misfit, valid_share=0.4, measured_share=1.0) for facts in one.facts)
-    assert [line.grade for line in result.distance(one)] == grades
+    assert [line.grade for line in of_accuracy.distance(one)] == grades
     (lacking,) = validity(one)
     assert ("line on distance" in lacking.advice) is bool(grades)
     assert [line.grade for line in accuracy(one)] == ["good"]
@@ -248,7 +248,7 @@ def test_under_a_doubted_rig_more_light_is_not_what_lacks(gain: float, doubted: 
     one.facts = KeptFacts(replace(facts, valid_share=0.1, measured_share=1.0) for facts in one.facts)
     lines = judgements(plan_of(one.lights), timing_of(), one)
     assert (graded(lines, "rig") != "good") == doubted
-    assert (next(line.advice for line in lines if line.subject == "validity") == result.RIG_FIRST) == doubted
+    assert (next(line.advice for line in lines if line.subject == "validity") == of_validity.RIG_FIRST) == doubted
 
 
 @pytest.mark.parametrize("lights", [3, 4])
@@ -291,7 +291,7 @@ def test_normals_that_are_off_are_laid_to_the_rig_where_another_one_explains_wha
     shape: str, fault: dict[str, Any], blamed: str, seed: int
 ) -> None:
     """Of a matte bust under five lights, one 5 degrees off, the surface was said not to be quite matte."""
-    (line,) = result.accuracy(Footage(shape=shape, lights=5, solved=True, **fault).observed(seed))
+    (line,) = of_accuracy.accuracy(Footage(shape=shape, lights=5, solved=True, **fault).observed(seed))
     assert line.grade == "doubtful"
     assert blamed in line.found
     assert ("directions" in line.found) == (blamed == "directions")

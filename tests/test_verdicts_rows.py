@@ -13,7 +13,7 @@ from psvideo.model.timing import DroppedFrames
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.report.html import _timing
-from psvideo.report.judge import of_motion, of_rows, of_timing, result
+from psvideo.report.judge import of_motion, of_rows, of_steadiness, of_timing
 from psvideo.report.judge.of_frames import frame_light
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.motion import glimpse, motion_between
@@ -136,7 +136,7 @@ def test_motion_and_sharpness_are_looked_for_in_plates_that_are_lit_where_the_fi
         one.add(each)
     assert one.motion.watched == "light1"
     assert one.blurs_px
-    assert one.blurs_px[0] < result.SOFT_PX
+    assert one.blurs_px[0] < of_steadiness.SOFT_PX
     assert [facts.moving_share is not None and facts.moving_share > 0.05 for facts in one.facts[1:]] == [True, True]
 
 

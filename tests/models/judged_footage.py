@@ -17,7 +17,7 @@ from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import AMBIENT, Round
-from psvideo.report.judge import result
+from psvideo.report.judge import of_accuracy, of_validity
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_rig import rig as judge_rig
@@ -307,11 +307,11 @@ def rig_but_leaning(one: Observed) -> list[Judgement]:
 
 
 def accuracy(one: Observed) -> list[Judgement]:
-    return list(result.accuracy(one))
+    return list(of_accuracy.accuracy(one))
 
 
 def validity(one: Observed) -> list[Judgement]:
-    return list(result.validity(one))
+    return list(of_validity.validity(one))
 
 
 def facts_of(**what: Any) -> InstantFacts:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from psvideo.model.timing import Timing
-from psvideo.report.judge.result import by_level, change_of
+from psvideo.report.judge.of_steadiness import by_level, change_of
 from psvideo.report.judgement import Judgement, gravest_first, usable, verdict_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE, Levels

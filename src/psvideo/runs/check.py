@@ -26,7 +26,7 @@ from psvideo.plates.sequence import Round
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame_light, later_frames
 from psvideo.report.judge.of_rows import MOST_UNSEEN
-from psvideo.report.judge.result import NOISY_DEG
+from psvideo.report.judge.typical_error import NOISY_DEG
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import thinned_round
 from psvideo.report.observe.observed import Observed

@@ -4,6 +4,7 @@
 nobody saw, frames that are missing), ``of_motion``, ``of_exposure``, ``of_saturation`` (clipping that the plan does not
 know of), ``of_steps`` (files that hold few levels), ``of_lamps`` (with ``unsteady_lamps``),
 ``of_ambient``, ``of_rig`` (by ``rig_by_plates``, ``of_strengths``, ``rig_by_normals`` and ``rig_of_three``),
-``result`` (accuracy, validity, focus, steadiness), ``of_what_moves`` (validity there).
+``of_accuracy`` and ``of_validity`` (by ``typical_error``), ``of_steadiness`` (with focus), ``of_what_moves`` (validity
+there).
 ``powers`` is for the live view alone, ``of_frames`` for ``psvideo check`` alone: frames before they are plates.
 """

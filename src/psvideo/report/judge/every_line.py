@@ -2,15 +2,17 @@
 
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
+from psvideo.report.judge.of_accuracy import accuracy, distance
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import ceiling_of, exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
+from psvideo.report.judge.of_steadiness import focus, steadiness
 from psvideo.report.judge.of_timing import timing_and_order
+from psvideo.report.judge.of_validity import first_of_all, validity
 from psvideo.report.judge.of_what_moves import what_moves
-from psvideo.report.judge.result import accuracy, distance, first_of_all, focus, steadiness, validity
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from psvideo.report.judge.result import HARDLY_VALID, LEAST_VALID, NOISY_DEG, by_noise_deg
+from psvideo.report.judge.of_validity import HARDLY_VALID, LEAST_VALID
+from psvideo.report.judge.typical_error import NOISY_DEG, by_noise_deg
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.facts import InstantFacts
 

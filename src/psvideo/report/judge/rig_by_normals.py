@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from psvideo.report.judge.of_exposure import LOST_CLIPPED
-from psvideo.report.judge.result import AT_REST, LOST_DEG, NOISY_DEG, by_noise_deg, moves, off_deg
+from psvideo.report.judge.typical_error import AT_REST, LOST_DEG, NOISY_DEG, by_noise_deg, moves, off_deg
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed

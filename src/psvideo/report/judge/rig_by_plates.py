@@ -7,7 +7,7 @@ import numpy as np
 from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judge.of_strengths import other_strengths
-from psvideo.report.judge.result import COMMON_DEG
+from psvideo.report.judge.typical_error import COMMON_DEG
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 

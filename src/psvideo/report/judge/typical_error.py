@@ -1,0 +1,66 @@
+"""How far off a typical normal is, by what shows it: what lights leave unexplained, noise, albedo with the slope."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
+
+COMMON_DEG = 3.0
+"""What a typical normal may be off by beyond noise."""
+LOST_DEG = 15.0
+"""From here on a normal says little of the surface: photographs under directions that were 1 to 8 degrees off came to
+13, and a bear under eight lights nearly in one plane to 18."""
+MEAN_OF_HELD = 0.83
+"""Predicted errors hold two thirds of the true ones; this is the mean as a share of it, for errors in two directions
+(Rayleigh)."""
+HARDLY_OFF = 0.05
+"""Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
+off), 20 degrees 6 to 11 %."""
+AT_REST = 0.05
+"""Noise is judged by results between which less of the picture than this moves."""
+NOISY_DEG, LOST_NOISY_DEG = 4.0, 10.0
+
+
+def three_fire(observed: Observed) -> bool:
+    """Return whether as few lights give light as explain any surface."""
+    return int(observed.firing.sum()) == ALL_EXPLAINED
+
+
+def off_deg(observed: Observed) -> float | None:
+    """Return how far off a typical normal is by more than noise, in the mean; None where nothing says so."""
+    known = [one.misfit.error_deg for one in observed.facts if one.misfit is not None]
+    return MEAN_OF_HELD * float(np.median(known)) if known else None
+
+
+def by_noise_deg(facts: Sequence[InstantFacts]) -> float:
+    """Return by how much noise turns a typical normal, in the mean; 0 where nothing says so."""
+    known = [one.misfit.noise_deg for one in facts if one.misfit is not None]
+    return MEAN_OF_HELD * float(np.median(known)) if known else 0.0
+
+
+def by_slope_deg(facts: Sequence[InstantFacts]) -> float:
+    """Return by how much typical normals are turned, in the mean, as albedo that goes with the slope shows it; 0 where
+    nothing does."""
+    return float(np.median([one.slope_deg for one in facts])) if facts else 0.0
+
+
+def steady_beyond_noise(observed: Observed) -> bool:
+    """Return whether normals at rest change so little between results that noise is not to blame for what is not
+    trusted, and the rig explains the plates: of few lights nothing else separates gloss or compression from noise."""
+    known = [one.change.normals_deg for one in observed.facts if one.change is not None]
+    return rig_explains(observed) and bool(known) and float(np.median(known)) < COMMON_DEG
+
+
+def rig_explains(observed: Observed) -> bool:
+    """Return whether the rig explains what each light gives."""
+    fit = observed.rig_fit
+    return fit is not None and fit.excess <= HARDLY_OFF
+
+
+def moves(facts: Sequence[InstantFacts]) -> bool:
+    """Return whether a usual round shows motion."""
+    shares = [one.moving_share for one in facts if one.moving_share is not None]
+    return bool(shares) and float(np.median(shares)) > AT_REST
