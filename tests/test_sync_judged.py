@@ -293,6 +293,26 @@ def test_lamps_that_flicker_are_not_taken_for_a_camera_whose_gain_changes(
     assert 0.1 < timing.swing.share < 0.4
 
 
+@pytest.mark.parametrize("widths", [0.3, 0.45])
+def test_a_lit_ball_that_leaves_the_picture_is_not_taken_for_lamps_that_flicker(
+    make_plan: PlanMaker, widths: float
+) -> None:
+    """Of a ball that crosses the picture's edge each light loses another share, more of it from flash to flash: lamps
+    whose drivers were to be checked."""
+    plan = make_plan(height_px=ROWS, width_px=ROWS)
+    row, col = (np.mgrid[0:ROWS, 0:ROWS] / ROWS - 0.5) / 0.35
+    crosses = widths / 0.35 / (FRAMES * plan.camera.frame_period_s)
+
+    def plate_of(flash: TrueFlash) -> np.ndarray:
+        x, turn = col - crosses * flash.start_s, 2 * np.pi * flash.slot / len(plan.lit_slots)
+        z = np.sqrt(np.maximum(1 - x**2 - row**2, 0.0))
+        lit = np.maximum(0.5 * np.cos(turn) * x + 0.5 * np.sin(turn) * row + 0.7 * z, 0.0)
+        return np.where((z > 0) & (flash.slot in plan.lit_slots), 0.6 * lit, 0.0).astype(np.float32)
+
+    shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
+    assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).swing is None
+
+
 @pytest.mark.parametrize("period", [7.0, 3.0])
 def test_a_camera_whose_gain_swings_is_not_taken_for_lamps_that_flicker(plan: Plan, period: float) -> None:
     timing = timing_of(plan, filmed(plan, gain=1 + 0.15 * np.sin(np.arange(FRAMES) / period)))

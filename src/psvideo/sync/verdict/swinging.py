@@ -2,10 +2,13 @@
 flashes, as of lamps whose supply swings.
 
 A frame of a rolling shutter mostly sees two flashes, and a flash is mostly seen by two frames. So both are told apart:
-under a gain for each frame, or for each flash, the right one leaves less over.
+under a gain for each frame, or for each flash, the right one leaves less over. A subject that moves changes what
+flashes show as well, but not in all rows alike, and mostly little by little.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +31,14 @@ TIED, TINY = 1e-3, 1e-30
 gains of black frames finite."""
 CLEARLY = 1.1
 """By this factor more must be left over under the other cause, in squares, for one to be named alone."""
+ROW_BLOCKS, ROWS_DIFFER = 4, 1.5
+"""Blocks of rows, of as much light each: gains alike in all rows leave this many times what gains of each block do
+where a subject moves (1.8 to 6 in virtual clips; 1.0 to 1.4 where lamps flicker over one that stands, noise included).
+"""
+ABRUPT = 0.25
+"""Gains of one light jump from flash to flash where these jumps are this share of how far they stray at all: 0.03 to
+0.15 where spheres cross the picture, 0.5 and more where lamps flicker or their supply swings in less than five rounds.
+"""
 TURNS = 4
 """Flashes whose tails or rows overlap share what is left; so often it is dealt out again."""
 TOGETHER = 512
@@ -51,6 +62,25 @@ class _Seen:
         """What is left over of the profiles, (frame, row)."""
         return self.rows.value - self.expected
 
+    def only_rows(self, rows: slice) -> "_Seen":
+        """Return what some rows show and are expected to."""
+        return replace(
+            self,
+            rows=self.rows.only_rows(rows),
+            light=self.light[rows],
+            expected=self.expected[:, rows],
+            trust=self.trust[:, rows],
+        )
+
+
+class _FlashGains(NamedTuple):
+    """The gains of those flashes of which enough was seen, against the whole clip's brightnesses, (flash,) in order of
+    time, whose ``light`` each is (flash,), and the square that gains of all flashes leave over."""
+
+    gain: Doubles
+    light: Integers
+    rest: float
+
 
 def swing_of(plan: Plan, found: ClipFit) -> Swing | None:
     """Return how a clip's light grows and shrinks, None where it does not. ``found`` holds those frames only whose
@@ -60,10 +90,13 @@ def swing_of(plan: Plan, found: ClipFit) -> Swing | None:
     for frames_each in GAIN_FRAMES:
         gains, rest_of_frames = _frame_gains(seen, frames_each=frames_each)
         if 1 - rest_of_frames / max(before, TINY) > GAIN_EXPLAINS and min(map(_range, gains)) > GAIN_RANGE:
-            flashes, rest = _flash_gains(seen)
+            flashes = _flash_gains(seen)
             (each, _), rest_of_frames = _frame_gains(seen, frames_each=1)
-            cause = _cause(rest_of_frames, rest)
-            return Swing(share=_range(flashes if cause == "lamps" else each), cause=cause)
+            cause = _cause(rest_of_frames, flashes.rest)
+            moves = cause == "lamps" and _rows_differ(seen, flashes.rest)
+            if moves and not _abrupt(flashes):
+                return None
+            return Swing(share=_range(flashes.gain if cause == "lamps" else each), cause="either" if moves else cause)
     return None
 
 
@@ -72,6 +105,23 @@ def _cause(under_frames: float, under_flashes: float) -> Cause:
     if under_flashes > CLEARLY * under_frames:
         return "camera"
     return "lamps" if under_frames > CLEARLY * under_flashes else "either"
+
+
+def _rows_differ(seen: _Seen, rest: float) -> bool:
+    """Return whether gains of flashes in each of a few blocks of rows leave clearly less than ``rest``, the square that
+    those of all rows leave, as where a subject moves: lamps change all rows alike."""
+    power = np.cumsum((seen.trust * seen.expected**2).sum(axis=0))
+    edges = np.searchsorted(power, power[-1] * np.linspace(0.0, 1.0, ROW_BLOCKS + 1)[1:-1])
+    blocks = [slice(a, b) for a, b in pairwise([0, *edges.tolist(), len(power)]) if b > a]
+    return rest > ROWS_DIFFER * sum(_flash_gains(seen.only_rows(block)).rest for block in blocks)
+
+
+def _abrupt(flashes: "_FlashGains") -> bool:
+    """Return whether gains of one light jump from each of its flashes to the next, and do not grow or shrink slowly."""
+    gains = [flashes.gain[flashes.light == light] for light in np.unique(flashes.light)]
+    jumps = np.concatenate([np.diff(one, n=2) for one in gains]) / np.sqrt(6.0)  # as large as gains that know nothing
+    strays = np.concatenate([one - np.median(one) for one in gains])  # of one another
+    return len(jumps) > 0 and bool(np.median(np.abs(jumps)) > ABRUPT * np.mean(np.abs(strays)))
 
 
 def _seen(plan: Plan, found: ClipFit) -> _Seen:
@@ -117,9 +167,7 @@ def _frame_gains(seen: _Seen, *, frames_each: int) -> tuple[tuple[Doubles, Doubl
     return (gain, 1 + np.where(lit, alone, 0.0)), rest
 
 
-def _flash_gains(seen: _Seen) -> tuple[Doubles, float]:
-    """Return the gains of those flashes of which enough was seen, against the whole clip's brightnesses, and the
-    square that gains of all flashes leave over."""
+def _flash_gains(seen: _Seen) -> _FlashGains:
     flashes, rest = compiled_flashes(seen.plan, seen.rows, seen.found.fit.beat), seen.change
     lit = np.flatnonzero(flashes.unknown)
     parts = np.array_split(lit, -(-len(lit) // TOGETHER)) if len(lit) else []
@@ -134,7 +182,7 @@ def _flash_gains(seen: _Seen) -> tuple[Doubles, float]:
             gain[some] += move
             np.subtract.at(rest, at, move[:, None, None] * own)
     enough = lit[power[lit] > DIM * np.median(power[lit])] if len(lit) else lit
-    return gain[enough], float((seen.trust * rest**2).sum())
+    return _FlashGains(gain[enough], flashes.unknown[enough], float((seen.trust * rest**2).sum()))
 
 
 def _own_light(seen: _Seen, flashes: Flashes, some: Integers) -> SeenFlashes:
