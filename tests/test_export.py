@@ -178,14 +178,34 @@ def test_a_time_code_is_counted_on_to_the_instant_where_it_can_be(tmp_path: Path
     [
         (Fraction(2997, 125), 5, "10:00:00:20", "10:00:00:20"),  # 23.976, as it is often written
         (Fraction(2997, 100), 5, "10:00:00;20", "10:00:00;20"),
-        (Fraction(120), 12, "10:00:00:20", None),  # no frame 20 at 12 a second
         (Fraction(120), 24, "10:00:00:20", "10:00:00:20"),
+        (Fraction(120), 20, "10:00:00:10", None),  # no time code counts 20, nor a multiple of it
     ],
 )
 def test_a_time_code_counts_the_frames_that_it_was_written_for(
     camera_fps: Fraction, fps: int, first: str, shown: str | None
 ) -> None:
     assert replace(TAGS, camera_fps=camera_fps, fps=Fraction(fps), first_time_code=first).time_code(0.0) == shown
+
+
+@pytest.mark.parametrize(
+    ("camera_fps", "fps", "shown"),
+    [
+        (240, 12, "10:00:00:23"),  # on twos, of 24
+        (120, 8, "10:00:00:23"),
+        (100, Fraction(25, 2), "10:00:00:24"),
+        (Fraction(240_000, 1001), Fraction(12_000, 1001), "10:00:00:23"),
+        (240, 15, "10:00:00:26"),  # half of 30
+        (240, 6, None),  # of 24 or of 30
+        (100, 5, "10:00:00:24"),  # no multiple of 24 or 30 is 100
+        (240, Fraction(182299, 10_000), None),
+    ],
+)
+def test_a_time_code_counts_the_project_s_frames_where_fewer_are_delivered(
+    camera_fps: int | Fraction, fps: int | Fraction, shown: str | None
+) -> None:
+    coded = replace(TAGS, camera_fps=Fraction(camera_fps), fps=Fraction(fps), first_time_code="10:00:00:11")
+    assert coded.time_code(0.52) == shown  # 0.52 s are 12 frames of 24 or 23.976, 13 of 25 and 15 of 30
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,9 @@ from psvideo.formats.paths import check_file
 CODE = re.compile(r"(\d\d):(\d\d):(\d\d)([:;.])(\d\d)")
 MOST_FRAMES = 30
 """EXR's time code counts at most 30 frames a second."""
-DROP_RATE, DROPPED = Fraction(30000, 1001), 2
+COUNTED = tuple(Fraction(rate) for rate in ("24000/1001", "24", "25", "30000/1001", "30"))
+"""The rates that time codes count (SMPTE ST 12-1)."""
+DROP_RATE, DROPPED = COUNTED[3], 2
 """The rate at which drop-frame codes keep to the clock, and how many numbers they leave out at the start of each minute
 but every tenth (SMPTE ST 12-1)."""
 
@@ -51,9 +53,9 @@ class Tags:
         """Return the time code of an instant, where the clip has one that goes on to it."""
         if self.first_time_code is None or self.camera_fps is None:
             return None
-        rates = [broadcast_fps(float(rate)) for rate in (self.camera_fps, self.fps)]
-        slow = next((rate for rate in rates if _has_time_code(rate)), rates[0])
-        return advanced(self.first_time_code, time_s, slow)
+        camera, delivered = (broadcast_fps(float(rate)) for rate in (self.camera_fps, self.fps))
+        counted = camera if _has_time_code(camera) else _counted(delivered, camera)
+        return None if counted is None else advanced(self.first_time_code, time_s, counted)
 
     def attributes(self, *, time_s: float, data: bool) -> dict[str, Attribute]:
         """Return the header attributes of one picture; ``data`` marks what is no colour (normals, masks)."""
@@ -90,8 +92,16 @@ def sha256_of(path: Path) -> str:
 
 
 def _has_time_code(fps: Fraction) -> bool:
-    """Return whether a time code counts this rate's frames; a camera that is faster counts those of the project."""
+    """Return whether a camera's time code counts its frames; one that is faster counts those of the project."""
     return round(fps) <= MOST_FRAMES and fps.denominator in (1, 1001)
+
+
+def _counted(delivered: Fraction, camera: Fraction) -> Fraction | None:
+    """Return the rate that the code of a fast camera counts: the delivery's. A delivery below 24 frames a second, such
+    as 12, is a part of the project's rate; None where it may be a part of several, or of none."""
+    whole = [rate for rate in COUNTED if (rate / delivered).denominator == 1]
+    fitting = [rate for rate in whole if (camera / rate).denominator == 1]
+    return delivered if delivered in COUNTED else fitting[0] if len(fitting) == 1 else None
 
 
 def advanced(code: str, time_s: float, fps: Fraction) -> str | None:
