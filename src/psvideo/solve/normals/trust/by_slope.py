@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 
 AVERAGED = 5
 """Normals and albedo are means over squares of so many points, and neighbours are so far apart: what noise does to both
@@ -52,13 +52,12 @@ as many degrees as the second number counts half, and nothing counts more: such 
 
 
 class _Pairs(NamedTuple):
-    """Neighbours: how the logarithm of albedo differs (pair,), how functions of the normal do (pair, function), these
-    at the first of each (pair, function), where that is and where the other is, in rows and columns over the subject's
-    size (pair, 2)."""
+    """Neighbours: how the logarithm of albedo differs (pair,), the normals of the first and of the other (pair, 3), and
+    where these are, in rows and columns over the subject's size (pair, 2)."""
 
     differs: Doubles
-    changes: Doubles
     here: Doubles
+    there: Doubles
     place: Doubles
     other: Doubles
 
@@ -72,12 +71,12 @@ def by_slope_deg(
     ``unseen`` and ``alike_unseen`` by residuals (``unchecked.py``)."""
     normals, albedo, whole = _averaged(points, known)
     bright = _bright(normals, albedo, lit, whole)
-    pairs = _pairs_of(normals, albedo, lit, bright)
+    pairs = _pairs_of(normals, albedo, bright)
     if pairs is None:
         return np.zeros(known.shape, np.float32)
     shown = np.zeros(known.shape, np.float32)
     if unseen:
-        typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs)))
+        typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs, lit)))
         shown = typical_deg * _turned_beside_stretched(points, lit, bright)
     if alike_unseen:
         shown = np.maximum(shown, np.float32(alike_unseen) * _turned_by_added_deg(points, lit, pairs))
@@ -88,42 +87,46 @@ def by_slope_deg(
 def _averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
     """Return normals (3, row, col) and albedo (row, col) of means over squares, and which squares are known as a whole
     and hold no edge of paint."""
-    each = points.brightness * known
-    means = np.stack([blurred(plane, AVERAGED) for plane in points.planes * each])
-    sizes, albedo = np.sqrt((means**2).sum(axis=0)), blurred(each, AVERAGED)
-    whole = known & (blurred(known.astype(np.float32), AVERAGED) > np.float32(0.999)) & (sizes > 0)
-    varies = np.sqrt(np.maximum(blurred(each * each, AVERAGED) - albedo * albedo, 0))
-    varies /= np.maximum(albedo, np.float32(1e-12))
+    from psvideo.solve.normals.trust.by_slope_kernel import SUMMED, fill_averaged, fill_summed
+
+    given = np.ascontiguousarray(known).view(np.uint8).reshape(-1)
+    summed = np.empty((SUMMED, *known.shape), np.float32)
+    fill_summed(points.planes.reshape(3, -1), line(points.brightness), given, summed.reshape(SUMMED, -1))
+    means = np.stack([blurred(plane, AVERAGED) for plane in summed])
+    varies, whole = np.empty(known.shape, np.float32), np.empty(known.shape, np.bool_)
+    fill_averaged(means.reshape(SUMMED, -1), given, line(varies), whole.view(np.uint8).reshape(-1))
     if whole.any():
         whole &= varies <= np.float32(EVEN) * median(varies[whole])
-    return means / np.maximum(sizes, np.float32(1e-12)), albedo, whole
+    return means[:3], means[3], whole
 
 
-def _pairs_of(normals: Floats, albedo: Floats, lit: Illumination, bright: Mask) -> _Pairs | None:
+def _pairs_of(normals: Floats, albedo: Floats, bright: Mask) -> _Pairs | None:
     """Return neighbours in the light of all lamps, None where there are too few."""
     cols = bright.shape[1]
     over, beside = (np.flatnonzero(both) for both in _both(bright))
     first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
     if len(first) < LEAST_PAIRS:
         return None
-    chosen = np.unique(np.linspace(0, len(first) - 1, MOST_PAIRS).astype(np.intp))
+    chosen = np.linspace(0, len(first) - 1, min(MOST_PAIRS, len(first))).astype(np.intp)
     first, second = first[chosen], second[chosen]
-    ways = normals.reshape(3, -1).astype(np.float64)
-    here, there = (_functions(ways[:, at].T, lit.directions) for at in (first, second))
+    ways = normals.reshape(3, -1)
+    here, there = (ways[:, at].T.astype(np.float64) for at in (first, second))
     ones = np.log(albedo.reshape(-1)[np.stack([first, second])].astype(np.float64))
     size = np.sqrt(np.count_nonzero(bright))
     place, other = (np.stack(np.divmod(at, cols), axis=-1) / size for at in (first, second))
-    return _Pairs(differs=ones[1] - ones[0], changes=there - here, here=here, place=place, other=other)
+    return _Pairs(differs=ones[1] - ones[0], here=here, there=there, place=place, other=other)
 
 
 def _bright(normals: Floats, albedo: Floats, lit: Illumination, known: Mask) -> Mask:
     """Return where of what is ``known`` all lights shine on a surface that is not black, (row, col)."""
-    cosines = np.tensordot(lit.directions.astype(np.float32), normals, axes=1)
-    mean = np.maximum(cosines, 0).mean(axis=0)
-    known = known & (cosines.min(axis=0) > np.float32(IN_LIGHT) * mean)
-    if not known.any():
-        return np.asarray(known)
-    return np.asarray(known & (albedo > LEAST_BRIGHT * median(albedo[known])))
+    from psvideo.solve.normals.trust.by_slope_kernel import fill_in_light
+
+    in_light = np.empty(known.shape, np.bool_)
+    flags = (each.view(np.uint8).reshape(-1) for each in (known, in_light))
+    fill_in_light(normals.reshape(3, -1), lit.directions.astype(np.float32), IN_LIGHT, *flags)
+    if not in_light.any():
+        return in_light
+    return np.asarray(in_light & (albedo > LEAST_BRIGHT * median(albedo[in_light])))
 
 
 def _both(bright: Mask) -> tuple[Mask, Mask]:
@@ -147,12 +150,14 @@ def _functions(normals: Doubles, directions: NDArray[np.floating]) -> Doubles:
     return np.concatenate([np.stack(smooth, axis=-1), *(shine**power for power in POWERS)], axis=1)
 
 
-def _goes_with_slope(pairs: _Pairs) -> float:
+def _goes_with_slope(pairs: _Pairs, lit: Illumination) -> float:
     """Return by which share of itself albedo typically differs with the slope, as far as one half of the subject tells
     it of the other."""
-    scale = np.sqrt((pairs.changes**2).mean(axis=0)) + 1e-9
-    numbers, told = _fitted(pairs, pairs.changes / scale)
-    whole = _about_median(pairs.here / scale @ numbers)
+    here, there = (_functions(normals, lit.directions) for normals in (pairs.here, pairs.there))
+    changes = there - here
+    scale = np.sqrt((changes**2).mean(axis=0)) + 1e-9
+    numbers, told = _fitted(pairs, changes / scale)
+    whole = _about_median(here / scale @ numbers)
     most = MOST_OUTLYING * float(np.sqrt((whole**2).mean()))
     rest, of_place = _without_place(np.clip(whole, -most, most), pairs.place)
     typical, typical_of_place = (TYPICAL_OF_MEDIAN * median(np.abs(each)) for each in (rest, OF_PLACE * of_place))
@@ -164,7 +169,7 @@ def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: _Pairs) 
     albedo differ as it does. Lamps at one angle to an axis take such light for a vector along it, which stretches
     normals that lean to it, and turns those that do not."""
     added = np.linalg.pinv(lit.directions) @ np.ones(len(lit.directions))
-    much = _surely(pairs, pairs.changes[:, :3] @ added)
+    much = _surely(pairs, (pairs.there - pairs.here) @ added)
     along = np.tensordot(added.astype(np.float32), points.planes, axes=1)
     across = np.sqrt(np.maximum(np.float32(added @ added) - along * along, np.float32(0)))
     return np.asarray(np.degrees(np.float32(much)) * across, np.float32)
@@ -226,7 +231,7 @@ def _explained(differs: Doubles, by_slope: Doubles, weights: Doubles) -> float:
 def _solved(changes: Doubles, differs: Doubles, weights: Doubles) -> Doubles:
     weighed = changes * weights[:, None]
     matrix = weighed.T @ changes
-    matrix[np.diag_indices(len(matrix))] += RIDGE * max(float(np.trace(matrix)) / len(matrix), 1e-9)
+    matrix.reshape(-1)[:: len(matrix) + 1] += RIDGE * max(float(matrix.trace()) / len(matrix), 1e-9)
     return np.asarray(np.linalg.solve(matrix, weighed.T @ differs))
 
 

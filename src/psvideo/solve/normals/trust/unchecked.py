@@ -8,6 +8,8 @@ What shows is normals that belong to no surface. There something is wrong, most 
 its shadow, light that comes by way of other surfaces passes for light that grazes.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from psvideo.model.arrays import Floats
@@ -106,16 +108,22 @@ def turned_unseen(lit: Illumination, *, power: int = 2) -> float:
     if len(lit.directions) <= ALL_EXPLAINED:
         return float("inf")
     strengths = lit.intensities.mean(axis=1) / lit.intensities.mean()
+    return _turned(tuple(map(tuple, lit.directions.tolist())), tuple(strengths.tolist()), power)
+
+
+@lru_cache(maxsize=64)
+def _turned(directions: tuple[tuple[float, ...], ...], strengths: tuple[float, ...], power: int) -> float:
+    """Return the same of distant lights, once for all rounds of a take."""
     place = (np.arange(NORMALS) + 0.5) / NORMALS
     z, around = 1 - place * (1 - FACING), np.pi * (1 + 5**0.5) * np.arange(NORMALS)  # evenly over a cap of the sphere
     across = np.sqrt(1 - z * z)
-    normals = np.stack([across * np.cos(around), across * np.sin(around), z], axis=-1)
-    cosines = normals @ lit.directions.T
+    normals, ways = np.stack([across * np.cos(around), across * np.sin(around), z], axis=-1), np.array(directions)
+    cosines = normals @ ways.T
     lit_by_all = (cosines > LIT).all(axis=1)
     if not lit_by_all.any():
         return 0.0
     normals, added = normals[lit_by_all], cosines[lit_by_all] ** power * strengths
-    matrix = lit.directions * strengths[:, None]
+    matrix = ways * np.array(strengths)[:, None]
     g = added @ np.linalg.pinv(matrix).T
     left = added - g @ matrix.T
     g -= (g * normals).sum(axis=1, keepdims=True) * normals
