@@ -98,10 +98,10 @@ def _around(errors: NDArray[np.floating], step: int) -> Floats:
     known = (thinned > 0).astype(np.float32)
     common = thinned.sum(dtype=np.float64) / max(known.sum(dtype=np.float64), 1.0)
     wide = int(AROUND * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 3
-    planes = np.stack([thinned, known], axis=-1)
+    planes = np.stack([thinned, known])
     for _ in range(2):  # twice over squares is nearly Gaussian
         planes = blurred(planes, wide)
-    return np.asarray((planes[..., 0] + FARTHER * np.float32(common)) / (planes[..., 1] + FARTHER), np.float32)
+    return np.asarray((planes[0] + FARTHER * np.float32(common)) / (planes[1] + FARTHER), np.float32)
 
 
 def _wanted(solved: Mask, one: Evidence) -> Mask:

@@ -92,7 +92,7 @@ def _averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
     given = np.ascontiguousarray(known).view(np.uint8).reshape(-1)
     summed = np.empty((SUMMED, *known.shape), np.float32)
     fill_summed(points.planes.reshape(3, -1), line(points.brightness), given, summed.reshape(SUMMED, -1))
-    means = np.stack([blurred(plane, AVERAGED) for plane in summed])
+    means = blurred(summed, AVERAGED)
     varies, whole = np.empty(known.shape, np.float32), np.empty(known.shape, np.bool_)
     fill_averaged(means.reshape(SUMMED, -1), given, line(varies), whole.view(np.uint8).reshape(-1))
     if whole.any():

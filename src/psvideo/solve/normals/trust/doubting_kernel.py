@@ -45,7 +45,7 @@ def fill_weighed(
     noise: Floats, shown: Floats, counts: Floats, lights: int, plain: bool, most_shown: float, most_noise: float,
     weighed: Floats,
 ) -> None:  # fmt: skip
-    """Limit ``shown`` to ``most_shown``, and fill ``weighed`` (point, 4) with it, with whether it is any, with it times
+    """Limit ``shown`` to ``most_shown``, and fill ``weighed`` (4, point) with it, with whether it is any, with it times
     the noise, and times as much of that as is not sure, up to ``most_noise``: nothing where a fit that is not ``plain``
     used no more lights than it has unknowns."""
     most, limit, four = np.float32(most_shown), np.float32(most_noise), np.float32(lights - 3)
@@ -53,10 +53,10 @@ def fill_weighed(
         weight = min(shown[i], most)
         checked = plain or counts[i] < four
         shown[i] = weight
-        weighed[i, 0] = weight
-        weighed[i, 1] = ONE if weight > ZERO else ZERO
-        weighed[i, 2] = noise[i] * weight
-        weighed[i, 3] = min(noise[i], limit) * weight if checked else ZERO
+        weighed[0, i] = weight
+        weighed[1, i] = ONE if weight > ZERO else ZERO
+        weighed[2, i] = noise[i] * weight
+        weighed[3, i] = min(noise[i], limit) * weight if checked else ZERO
 
 
 @FUSED.kept
@@ -66,10 +66,10 @@ def fill_levels(means: Floats, points: float, certain: float, unsure: float, lev
     it."""
     count_of, errors, share = np.float32(points), np.float32(certain), np.float32(unsure)
     for i in range(levels.shape[1]):
-        here, count = means[i, 0] + TINY, (means[i, 1] + TINY) * count_of
+        here, count = means[0, i] + TINY, (means[1, i] + TINY) * count_of
         levels[0, i] = here
-        levels[1, i] = errors * np.sqrt(np.float32(2) / max(count, ONE)) * (means[i, 2] + TINY) / here
-        levels[2, i] = share * (means[i, 3] + TINY) / here
+        levels[1, i] = errors * np.sqrt(np.float32(2) / max(count, ONE)) * (means[2, i] + TINY) / here
+        levels[2, i] = share * (means[3, i] + TINY) / here
 
 
 @FUSED.kept
@@ -123,7 +123,7 @@ def fill_changes(
 
 @FUSED.kept
 def fill_torn(planes: Floats, known: Bytes, least_facing: float, most_torn: float, torn: Floats) -> None:
-    """Fill ``torn`` (row, col, 2) with what slopes of normals (3, row, col) around four points add up to, as they are
+    """Fill ``torn`` (2, row, col) with what slopes of normals (3, row, col) around four points add up to, as they are
     seen, and with 1 where these four are known, else zeros."""
     least, most, quarter = np.float32(least_facing), np.float32(most_torn), np.float32(0.25)
     rows, cols = known.shape
@@ -132,7 +132,7 @@ def fill_torn(planes: Floats, known: Bytes, least_facing: float, most_torn: floa
         np.empty((2, cols), np.float32),
         np.empty((2, cols), np.float32),
     )
-    torn[rows - 1] = ZERO
+    torn[:, rows - 1] = ZERO
     for row in range(rows):
         new, old = row % 2, 1 - row % 2
         for col in range(cols):
@@ -147,20 +147,20 @@ def fill_torn(planes: Floats, known: Bytes, least_facing: float, most_torn: floa
             seen = (facing[old, col] + facing[new, col] + facing[old, col + 1] + facing[new, col + 1]) * quarter
             whole = (along + over) * HALF * seen * np.sqrt(seen)
             within = known[row - 1, col] & known[row, col] & known[row - 1, col + 1] & known[row, col + 1]
-            torn[row - 1, col, 0] = min(max(whole, -most), most) if within else ZERO
-            torn[row - 1, col, 1] = ONE if within else ZERO
-        torn[row - 1, cols - 1, 0] = ZERO
-        torn[row - 1, cols - 1, 1] = ZERO
+            torn[0, row - 1, col] = min(max(whole, -most), most) if within else ZERO
+            torn[1, row - 1, col] = ONE if within else ZERO
+        torn[0, row - 1, cols - 1] = ZERO
+        torn[1, row - 1, cols - 1] = ZERO
 
 
 @FUSED.kept
 def square_torn(means: Floats, torn: Floats, scale: float) -> None:
-    """Put in the place of what slopes add up to, ``torn`` (point, 2), the square of its mean over squares of points,
+    """Put in the place of what slopes add up to, ``torn`` (2, point), the square of its mean over squares of points,
     in units that ``scale`` makes, where it is known."""
     times = np.float32(scale)
-    for i in range(len(torn)):
-        each = (means[i, 0] + TINY) / (means[i, 1] + TINY) * times
-        torn[i, 0] = each * each * torn[i, 1]
+    for i in range(torn.shape[1]):
+        each = (means[0, i] + TINY) / (means[1, i] + TINY) * times
+        torn[0, i] = each * each * torn[1, i]
 
 
 @FUSED.kept
@@ -173,7 +173,7 @@ def fill_torn_deg(
     ``of_noise`` of noise; the means are of what ``square_torn`` gave."""
     sure, likely = np.float32(surely * surely), np.float32(of_noise * of_noise)
     for i in range(torn_deg.shape[1]):
-        squared, noise = (means[i, 0] + TINY) / (means[i, 1] + TINY), noise_deg[i] * noise_deg[i]
+        squared, noise = (means[0, i] + TINY) / (means[1, i] + TINY), noise_deg[i] * noise_deg[i]
         squared -= sure * uneven[i] * misfit_deg[i] * misfit_deg[i]
         torn_deg[0, i] = np.sqrt(max(squared - sure * noise, ZERO))
         torn_deg[1, i] = np.sqrt(max(squared - likely * noise, ZERO))

@@ -21,7 +21,7 @@ from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.noise_spread import NoiseSpread, Spreading
 from psvideo.solve.normals.trust.signs import Signs, signs_of
-from psvideo.solve.normals.trust.thin_surface import ThinSurface
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, every_nth
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
 
 
@@ -52,8 +52,9 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
     near = near_spread(one.lit, _thin_shape(surface, one))
-    spread = NoiseSpread.of(surface, one, noise, how.spreading, near)
-    points = spread.points(surface)
+    some = every_nth(surface, one.step_of(surface.valid.shape))
+    spread = NoiseSpread.of(some, one, noise, how.spreading, near)
+    points = spread.points(some)
     turned_deg = moved_deg(points, one, noise)
     signs = signs_of(points, one, turned_deg)
     doubt, moving = doubt_deg(signs, how=how.doubting), None
@@ -140,7 +141,8 @@ def looked_at(
     """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
     to."""
     near = near_spread(one.lit, _thin_shape(surface, one))
-    points = NoiseSpread.of(surface, one, noise, how.spreading, near).points(surface)
+    some = every_nth(surface, one.step_of(surface.valid.shape))
+    points = NoiseSpread.of(some, one, noise, how.spreading, near).points(some)
     return points, signs_of(points, one, by_slope=by_slope)
 
 

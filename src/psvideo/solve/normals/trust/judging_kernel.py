@@ -38,17 +38,26 @@ def judge_rows(
     trace, holds_fit = xx + yy + zz, f.size > 0
     beyond, usual = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
     sizes, means = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
-    ends, place, way = np.empty((2, cols), np.float32), np.empty(cols, np.uint32), np.empty(cols, np.float32)
+    place, way, rises = np.empty(cols, np.uint32), np.empty(cols, np.float32), np.empty(cols, np.float32)
+    ends = np.empty((4, 2, cols), np.float32)
     _place_columns(step, place, way)
-    near = dim.size > 0
+    near, held = dim.size > 0, -2
     reaching, turning = np.ones(cols, np.float32), np.ones(cols, np.float32)
     for row in range(first, last):
+        if row // step != held:
+            if d.size:
+                _hold_ends(d[0], row // step, held, rises, place, way, ends[0])
+                _hold_ends(d[1], row // step, held, rises, place, way, ends[1])
+            if near:
+                _hold_ends(dim, row // step, held, rises, place, way, ends[2])
+                _hold_ends(wider, row // step, held, rises, place, way, ends[3])
+            held = row // step
         if d.size:
-            _fill_between(d[0], row, step, ends, place, way, beyond)
-            _fill_between(d[1], row, step, ends, place, way, usual)
+            _fill_between(ends[0], row, step, beyond)
+            _fill_between(ends[1], row, step, usual)
         if near:
-            _fill_between(dim, row, step, ends, place, way, reaching)
-            _fill_between(wider, row, step, ends, place, way, turning)
+            _fill_between(ends[2], row, step, reaching)
+            _fill_between(ends[3], row, step, turning)
         sizes[:], means[:] = ZERO, TINY
         for channel in range(channels):
             counts_by = shares[channel] * share
@@ -86,10 +95,14 @@ def add_rows(error: Samples, more: Floats, step: int, first: int, last: int) -> 
     out, d = lent(error), lent(more)
     cols = out.shape[1]
     line = np.zeros(cols, np.float32)
-    ends, place, way = np.empty((2, cols), np.float32), np.empty(cols, np.uint32), np.empty(cols, np.float32)
+    place, way, rises = np.empty(cols, np.uint32), np.empty(cols, np.float32), np.empty(cols, np.float32)
+    ends, held = np.empty((2, cols), np.float32), -2
     _place_columns(step, place, way)
     for row in range(first, last):
-        _fill_between(d, row, step, ends, place, way, line)
+        if row // step != held:
+            _hold_ends(d, row // step, held, rises, place, way, ends)
+            held = row // step
+        _fill_between(ends, row, step, line)
         for col in range(cols):
             one = decoded(out[row, col])
             degrees = min(np.sqrt(one * one + line[col] * line[col]), LARGEST_DEG)
@@ -97,20 +110,37 @@ def add_rows(error: Samples, more: Floats, step: int, first: int, last: int) -> 
 
 
 @FUSED.inlined
-def _fill_between(coarse: Floats, row: int, step: int, ends: Floats, place: Indices, way: Floats, line: Floats) -> None:
-    """Fill a row from a plane of every ``step``-th row and column; ``ends`` (2, col) is room for what lies at these and
-    what it rises by to the next; ``place`` and ``way`` are those of ``_place_columns``."""
-    y, one = row // step, ONE / np.float32(step)
-    down, below = np.float32(row - y * step) * one, min(y + 1, coarse.shape[0] - 1)
-    above, under, begins, rises = coarse[y], coarse[below], ends[0], ends[1]
-    for x in range(above.shape[0]):
-        begins[x] = above[x] + down * (under[x] - above[x])
-    last = above.shape[0] - 1
+def _hold_ends(coarse: Floats, at: int, held: int, rises: Floats, place: Indices, way: Floats, ends: Floats) -> None:
+    """Fill ``ends`` (2, col) with what lies between the columns of a plane of every n-th row and column in its row
+    ``at`` and in the next one; those of the row ``held`` are there. Numbers are picked by place for these alone, which
+    takes longer than all that is done with them in the rows between."""
+    above, under = ends[0], ends[1]
+    if at == held + 1:
+        for col in range(above.shape[0]):
+            above[col] = under[col]
+    else:
+        _fill_across(coarse[at], rises, place, way, above)
+    _fill_across(coarse[min(at + 1, coarse.shape[0] - 1)], rises, place, way, under)
+
+
+@FUSED.inlined
+def _fill_across(coarse: Floats, rises: Floats, place: Indices, way: Floats, line: Floats) -> None:
+    """Fill a row between every n-th column; ``rises`` is room for what it rises by from each to the next, ``place`` and
+    ``way`` are those of ``_place_columns``."""
+    last = coarse.shape[0] - 1
     for x in range(last):
-        rises[x] = begins[x + 1] - begins[x]
+        rises[x] = coarse[x + 1] - coarse[x]
     rises[last] = ZERO
     for col in range(line.shape[0]):
-        line[col] = begins[place[col]] + way[col] * rises[place[col]]
+        line[col] = coarse[place[col]] + way[col] * rises[place[col]]
+
+
+@FUSED.inlined
+def _fill_between(ends: Floats, row: int, step: int, line: Floats) -> None:
+    """Fill a row from those of every ``step``-th before and after it."""
+    down, above, under = np.float32(row % step) * (ONE / np.float32(step)), ends[0], ends[1]
+    for col in range(line.shape[0]):
+        line[col] = above[col] + down * (under[col] - above[col])
 
 
 @FUSED.inlined

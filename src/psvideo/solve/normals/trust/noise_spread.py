@@ -1,13 +1,13 @@
 """How noise spreads into normals, and what residuals say beside it: in every pixel, or at the points of a grid."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
-from psvideo.compute.spilled import let_go, lie_in_files, planes_for, thin
+from psvideo.compute.spilled import let_go, lie_in_files, planes_for
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import Surface
@@ -55,25 +55,26 @@ class NoiseSpread:
     of_residual: float
 
     @classmethod
-    def of(cls, surface: Surface, one: Evidence, noise: PlateNoise, how: Spreading, near: NearSpread) -> "NoiseSpread":
+    def of(cls, some: Surface, one: Evidence, noise: PlateNoise, how: Spreading, near: NearSpread) -> "NoiseSpread":
         """Return how the noise of a surface's plates spreads, by how it was solved: robust solving weighed lights by
-        their noise and left degrees in ``error_deg``; least squares counted all alike and left residuals."""
+        their noise and left degrees in ``error_deg``; least squares counted all alike and left residuals. ``some``: the
+        surface at the points (``every_nth``)."""
         lit = one.lit
         strength, lights = lit.intensities.mean(axis=1), len(lit.intensities)
-        light = _typical_light(surface, one) * float(strength.mean())
+        light = _typical_light(some) * float(strength.mean())
         sigmas = light_sigmas(lit, combined_noise(noise, lit), light=light, share=how.least_share)
         matrix = lit.directions * strength[:, None]
         to_noise = matrix / sigmas[:, None]
-        solving = np.linalg.pinv(matrix) * sigmas if surface.error_deg is None else np.linalg.pinv(to_noise)
+        solving = np.linalg.pinv(matrix) * sigmas if some.error_deg is None else np.linalg.pinv(to_noise)
         channels, (_, photon_share), mean = len(lit.shares), lit.noise_shares, float(strength.mean())
         floors = [(share * mean) ** 2 for share in (how.least_share, float(LIGHTS))]
         photon = noise.photon * photon_share * float(np.sqrt(lit.shares.mean()))  # ``judge_rows`` divides by the shares
         variances = [noise.read / channels, photon * mean, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
-        plain = surface.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
+        plain = some.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
         told, told_noise = _told_by_residuals(matrix, sigmas) if plain else (1.0, 1.0)
         return cls(
-            step=one.step_of(surface.valid.shape),
+            step=one.step_of(one.plates[0].shape),
             noise=Spread(
                 shares=lit.shares.astype(np.float32),
                 inverse=(solving @ solving.T).astype(np.float32),
@@ -95,18 +96,8 @@ class NoiseSpread:
         known = self.of_residual > 0 and surface.residual is not None
         return bits(surface.residual) if known and surface.residual is not None else NOTHING
 
-    def points(self, surface: Surface) -> ThinSurface:
+    def points(self, some: Surface) -> ThinSurface:
         """Return every nth row and column of a surface, and what noise and residuals make of them."""
-        step = self.step
-        some = replace(
-            surface,
-            normals=thin(surface.normals, step),
-            albedo=thin(surface.albedo, step),
-            valid=surface.valid[::step, ::step],
-            residual=None if surface.residual is None else thin(surface.residual, step),
-            error_deg=None if surface.error_deg is None else thin(surface.error_deg, step),
-            source=None,
-        )
         fit, v = self.fit(some), self.noise.variances
         noise_deg, fit_deg, of_noise_deg = np.zeros((3, *some.valid.shape), np.float32)
         self.fill(some, NOTHING, self.noise, (0.0, 0.0), noise_deg)
@@ -114,7 +105,7 @@ class NoiseSpread:
             self.fill(some, fit, self.noise._replace(variances=np.zeros_like(v)), (0.0, 1.0), fit_deg)
             self.fill(some, NOTHING, self.noise._replace(variances=v[[0, 1, 3, 3]]), (0.0, 0.0), of_noise_deg)
         return ThinSurface(
-            step=step,
+            step=self.step,
             surface=some,
             noise_deg=noise_deg,
             fit_deg=fit_deg,
@@ -177,8 +168,7 @@ def _told_by_residuals(matrix: NDArray[np.float64], sigmas: NDArray[np.float64])
     return float(told), float(told * np.sqrt(of_noise))
 
 
-def _typical_light(surface: Surface, one: Evidence) -> float:
+def _typical_light(some: Surface) -> float:
     """Return the albedo that is typical of the brighter half of a surface."""
-    step = one.step_of(surface.valid.shape)
-    shown = brightness(surface.albedo[::step, ::step])[surface.valid[::step, ::step]]
+    shown = brightness(some.albedo)[some.valid]
     return median(shown[shown >= median(shown)]) if shown.size else 0.0

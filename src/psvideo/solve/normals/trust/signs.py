@@ -188,7 +188,8 @@ def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
     alike for a vector, of which what lies across the normal turns it."""
     from psvideo.solve.normals.trust.doubting_kernel import fill_indirect_deg
 
-    near, far = (np.stack([blurred(plane, width) for plane in seen[:2]]).reshape(2, -1) for width in points.widths)
+    both = np.stack(seen[:2])
+    near, far = (blurred(both, width).reshape(2, -1) for width in points.widths)
     added = (np.linalg.pinv(one.lit.directions) @ np.ones(len(one.plates))).astype(np.float32)
     turned = np.empty(points.known.shape, np.float32)
     fill_indirect_deg(

@@ -50,14 +50,14 @@ class Surroundings:
         bright = albedo * albedo
         common = (noise * bright).sum() / max(bright.sum(), 1e-9)  # black cloth is nothing but noise
         most = albedo.sum() / max(np.count_nonzero(points.known), 1)  # glare is no more than the rest
-        weighed, counts = np.empty((*noise.shape, 4), np.float32), line(one.indirect.counts)
+        weighed, counts = np.empty((4, *noise.shape), np.float32), line(one.indirect.counts)
         fill_weighed(
-            line(noise), line(albedo), counts, lights, plain, float(most), float(common), weighed.reshape(-1, 4)
+            line(noise), line(albedo), counts, lights, plain, float(most), float(common), weighed.reshape(4, -1)
         )
         found = []
         for width in points.widths:
             levels, unsure = np.empty((3, *noise.shape), np.float32), float(UNSURE_OF_NOISE - 1)
-            means = blurred(weighed, width).reshape(-1, 4)
+            means = blurred(weighed, width).reshape(4, -1)
             fill_levels(means, float(width**2), float(CERTAIN), unsure, levels.reshape(3, -1))
             weight, by_chance, margin = levels
             found.append(

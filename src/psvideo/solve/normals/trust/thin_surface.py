@@ -5,13 +5,14 @@ every such point.
 """
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import thin
 from psvideo.model.arrays import Bytes, Floats
 from psvideo.model.surface import Surface
 
@@ -57,6 +58,19 @@ class ThinSurface:
         return np.ascontiguousarray(self.surface.valid).view(np.uint8)
 
 
+def every_nth(surface: Surface, step: int) -> Surface:
+    """Return every ``step``-th row and column of a surface as it was solved, in new memory."""
+    return replace(
+        surface,
+        normals=thin(surface.normals, step),
+        albedo=thin(surface.albedo, step),
+        valid=surface.valid[::step, ::step],
+        residual=None if surface.residual is None else thin(surface.residual, step),
+        error_deg=None if surface.error_deg is None else thin(surface.error_deg, step),
+        source=None,
+    )
+
+
 def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
     """Return how many points, an odd number, are a share of the size of a subject of all ``known`` ones."""
     return max(int(share * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 1, LEAST_AROUND)
@@ -75,6 +89,11 @@ def line(plane: Floats) -> Floats:
     return np.ascontiguousarray(plane, np.float32).reshape(-1)
 
 
-def blurred(plane: Floats, width: int, into: Floats | None = None) -> Floats:
-    """Return means over squares, beyond whose borders there is nothing."""
-    return np.asarray(cv2.blur(plane, (width, width), into, borderType=cv2.BORDER_CONSTANT), np.float32)
+def blurred(planes: Floats, width: int, into: Floats | None = None) -> Floats:
+    """Return means of planes, (row, col) or (plane, row, col), over squares beyond whose borders there is nothing; they
+    lie ``into`` other memory of that shape, if any is given."""
+    means: Floats = np.empty(planes.shape, np.float32) if into is None else into
+    each = (picture.reshape(-1, *planes.shape[-2:]) for picture in (planes, means))
+    for given, mean in zip(*each, strict=True):
+        cv2.blur(given, (width, width), mean, borderType=cv2.BORDER_CONSTANT)
+    return means

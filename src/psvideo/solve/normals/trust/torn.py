@@ -25,13 +25,13 @@ def torn_angles_deg(
     whose ``view`` it is of a picture of this ``shape``, it is the slopes of the logarithm of depth that do."""
     from psvideo.solve.normals.trust.doubting_kernel import fill_torn, fill_torn_deg, square_torn
 
-    torn = np.empty((*points.known.shape, 2), np.float32)
+    torn = np.empty((2, *points.known.shape), np.float32)
     fill_torn(_along_rays(points, view, shape), points.known_bytes, float(LEAST_FACING), float(MOST_TORN), torn)
-    square_torn(blurred(torn, TORN).reshape(-1, 2), torn.reshape(-1, 2), math.degrees(TORN / 2))
+    square_torn(blurred(torn, TORN).reshape(2, -1), torn.reshape(2, -1), math.degrees(TORN / 2))
     angles = np.empty((2, *points.known.shape), np.float32)
     given = line(points.noise_deg), line(misfit_deg), line(uneven)
     shares = float(SURELY_TORN), float(TORN_OF_NOISE)
-    fill_torn_deg(blurred(torn, NEAR).reshape(-1, 2), *given, *shares, angles.reshape(2, -1))
+    fill_torn_deg(blurred(torn, NEAR).reshape(2, -1), *given, *shares, angles.reshape(2, -1))
     return angles[0], angles[1]
 
 
