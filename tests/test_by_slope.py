@@ -12,6 +12,7 @@ from ring_and_ball import ring
 from psvideo.model.surface import MEASURED
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.trust.by_slope_kernel import SUMMED, fill_averaged, fill_in_light, fill_summed
 from psvideo.solve.normals.trust.judging import looked_at
 from psvideo.solve.normals.trust.unchecked import alike_unseen_share
 
@@ -158,3 +159,29 @@ def test_too_few_points_in_the_light_of_all_lamps_say_nothing() -> None:
     few[10:22, 10:22] = True
     surface, one, noise = Solving(error=True).measured(case.plates, case.lit, mask=few)
     assert not np.any(looked_at(surface, one, noise)[1].by_slope_deg)
+
+
+def test_what_is_averaged_and_what_all_lamps_light_is_what_plain_numpy_gives() -> None:
+    rng, rows, cols = np.random.default_rng(5), 33, 47
+    known, albedo = rng.random((rows, cols)) < 0.9, rng.random((rows, cols)).astype(np.float32)
+    normals = rng.normal(size=(3, rows, cols)) + np.array([0, 0, 3])[:, None, None]
+    normals = (normals / np.linalg.norm(normals, axis=0)).astype(np.float32)
+    flags, (varies, whole) = known.view(np.uint8).reshape(-1), (np.empty(rows * cols, kind) for kind in "fB")
+    summed = np.empty((SUMMED, rows * cols), np.float32)
+    fill_summed(normals.reshape(3, -1), albedo.reshape(-1), flags, summed)
+    light = albedo * known
+    plain = np.stack([*(normals * light), light, light * light, known])
+    np.testing.assert_allclose(summed.reshape(plain.shape), plain, rtol=1e-6)
+    means = np.stack([cv2.blur(each, (5, 5), borderType=cv2.BORDER_CONSTANT) for each in plain])
+    sums = means[:3].copy()
+    fill_averaged(means.reshape(SUMMED, -1), flags, varies, whole)
+    np.testing.assert_allclose(means[:3], sums / np.linalg.norm(sums, axis=0), atol=1e-6)
+    spread = np.sqrt(np.maximum(means[4] - means[3] ** 2, 0)) / means[3]
+    np.testing.assert_allclose(varies, spread.ravel(), atol=1e-3)
+    np.testing.assert_array_equal(whole.reshape(rows, cols) > 0, known & (means[5] > 0.999))
+    ways, lit = ring(5, 40.0).astype(np.float32), np.empty(rows * cols, np.uint8)
+    fill_in_light(normals.reshape(3, -1), ways, 0.2, flags, lit)
+    cosines = np.tensordot(ways, normals, axes=1)
+    expected = known & (cosines.min(axis=0) > 0.2 * np.maximum(cosines, 0).mean(axis=0))
+    assert np.count_nonzero(lit.reshape(rows, cols).astype(bool) != expected) <= 1  # on the border by a rounding
+    assert 0.1 < expected.mean() < 0.89
