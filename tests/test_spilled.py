@@ -141,7 +141,7 @@ def test_where_few_rows_are_wanted_there_is_room_for_few() -> None:
         made.append((rows.tolist(), into.shape[1]))
 
     given = task(shown.samples, lit, None, None, Usable(), 0.0, 1.0)
-    run = replace(shown, makes=make)
+    run = replace(shown, makes=lambda: make)
     for step in (1, 31):
         made.clear()
         run.in_bands(lambda *_: None, given, lambda _: None, threads=1, step=step)

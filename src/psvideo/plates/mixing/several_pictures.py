@@ -5,6 +5,7 @@ What they share, frames in their codes and levels of ambient light, is taken onc
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +58,16 @@ class _Parts:
         return cls(frames=tuple(frames.values()), levels=tuple(levels.values()), shares=shares, taken=taken)
 
 
-def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, Image], None]:
-    """Return what makes rows of several pictures in the thread that calls it: ``make(rows, first, into)`` takes them in
-    rising order, and an array (picture, row, col[, channel]) that begins with the row ``first``."""
+class MakeRows(Protocol):
+    """Makes rows of several pictures, again and again in one thread: ``rows`` in rising order, into an array (picture,
+    row, col[, channel]) that begins with the row ``first``."""
+
+    def __call__(self, rows: NDArray[np.intp], first: int, into: Image) -> None:
+        """Make the rows."""
+
+
+def rows_maker(pictures: Sequence[Mixture]) -> Callable[[], MakeRows]:
+    """Return what gives a thread what makes rows of several pictures."""
     alike = {(one.ceiling, one.clips_from, one.shape, one.frames[0].codes.dtype, one.is_made) for one in pictures}
     if len(alike) > 1 or pictures[0].is_made:
         readers = [one.reader() for one in pictures]
@@ -71,15 +79,20 @@ def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, 
                 for begin, end in spans:
                     read(begin, end, made[begin - first : end - first])
 
-        return make_each
+        return lambda: make_each
     parts = _Parts.of(pictures)
     together = replace(pictures[0], frames=parts.frames, coefficients=parts.shares[0], levels=parts.levels, taken=None)
     counts: NDArray[np.bool_] = np.logical_or.reduce(parts.shares != 0)
     bound = replace(together.bound(), counts=counts)
     shares, taken = (np.ascontiguousarray(part, np.float32) for part in (parts.shares, parts.taken))
 
-    def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
-        flat = into.reshape(*into.shape[:2], -1)
-        bound.run(mix_pictures, rows, shares, taken, rows, first, flat)
+    def begin() -> MakeRows:
+        reading = bound.reading()
 
-    return make
+        def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
+            flat = into.reshape(*into.shape[:2], -1)
+            reading.run(mix_pictures, rows, shares, taken, rows, first, flat)
+
+        return make
+
+    return begin

@@ -11,7 +11,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Image, Mask
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
-from psvideo.plates.mixing.several_pictures import rows_maker
+from psvideo.plates.mixing.several_pictures import MakeRows, rows_maker
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Result, Samples, Task
 
@@ -51,10 +51,11 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 
 @dataclass(frozen=True, kw_only=True)
 class ShownPlates:
-    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape and what ``makes`` rows."""
+    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape and what ``makes`` rows, given
+    to every thread by itself."""
 
     samples: list[Samples]
-    makes: Callable[[NDArray[np.intp], int, Image], None] | None = None
+    makes: Callable[[], MakeRows] | None = None
 
     @classmethod
     def of(cls, plates: Sequence[Samples] | Sequence[Mixture]) -> "ShownPlates":
@@ -75,7 +76,7 @@ class ShownPlates:
             for plate, part in zip(codes, into, strict=True):
                 part[rows - first] = plate[rows]
 
-        return ShownPlates(samples=[np.broadcast_to(np.float32(0), plate.shape) for plate in codes], makes=make)
+        return ShownPlates(samples=[np.broadcast_to(np.float32(0), plate.shape) for plate in codes], makes=lambda: make)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -100,8 +101,8 @@ class ShownPlates:
         plates did. (Numba's own thread pool may abort when two use it.)
         """
         rows, cols = self.shape[:2]
-        make = self.makes
-        if make is None:
+        makes = self.makes
+        if makes is None:
             over_ranges(
                 lambda first, last: run(given, memory(given), first, last),
                 rows,
@@ -118,7 +119,7 @@ class ShownPlates:
             held = np.empty((lights, made_rows, *self.shape[1:]), np.float32)
             begins = np.array([plate.ctypes.data for plate in held], np.intp)
             begins = np.pad(begins, (0, len(given.plates) - lights), mode="edge")
-            room = memory(given)
+            room, make = memory(given), makes()
             for first in range(begin, end, made_rows):
                 last = min(first + made_rows, end)
                 wanted = np.arange(-(-first // step) * step, last, step)

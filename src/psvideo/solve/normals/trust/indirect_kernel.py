@@ -27,6 +27,7 @@ MOST_INDIRECT = np.float32(0.5)  # of the albedo: more is a highlight, or a wron
 # is added up of all lights, and the equations of the lights that reach it (SOME) and of all (EVERY), six planes each.
 X, Y, Z, SIZE, LEVEL, HERE, TOTAL, NUMBER, LEFT, SHOWING = (BLOCK * plane for plane in range(10))
 SOME, EVERY = 10 * BLOCK, 16 * BLOCK
+PICKED = 22 * BLOCK  # samples that lie apart in a row, side by side
 
 
 @FUSED.kept
@@ -57,15 +58,21 @@ def indirect_rows(
                 _add_light(t, w, light, soft, begin, step, points)
             place, down = (col + begin) // step, row // step
             for point in range(points):
-                known = w[SIZE + point] > ZERO
-                total[down, place + point] = w[TOTAL + point] if known else total[down, place + point]
-                count[down, place + point] = w[NUMBER + point] if known else count[down, place + point]
-                spread = _widened(w, point)
-                spreads[down, place + point] = spread if known else spreads[down, place + point]
+                w[PICKED + point] = _widened(w, point)
+            _keep_known(w, TOTAL, points, total[down, place : place + points])
+            _keep_known(w, NUMBER, points, count[down, place : place + points])
+            _keep_known(w, PICKED, points, spreads[down, place : place + points])
             for point in range(points if squares.size else 0):
                 if w[SIZE + point] > ZERO:
                     over[down, place + point] = w[LEFT + point]
                     lit[down, place + point] = w[SHOWING + point]
+
+
+@FUSED.inlined
+def _keep_known(w: Floats, plane: int, points: int, out: Floats) -> None:
+    """Store a plane of a block where a point is known."""
+    for point in range(points):
+        out[point] = w[plane + point] if w[SIZE + point] > ZERO else out[point]
 
 
 @FUSED.inlined
@@ -98,7 +105,9 @@ def _read_level(task: Task, w: Floats, light: int, row: int, col: int, step: int
     for channel in range(channels):
         (gain, offset, ceiling, _), share = task.tone[light, channel], each * task.shares[channel]
         for point in range(points):
-            value = np.float32(samples[point * step * channels + channel]) * gain + offset
+            w[PICKED + point] = np.float32(samples[point * step * channels + channel])
+        for point in range(points):
+            value = w[PICKED + point] * gain + offset
             w[HERE + point] = w[HERE + point] if (value < ceiling) & (value > ABSENT) else ZERO
             w[LEVEL + point] += value * share
     for point in range(points if task.seen.size else 0):
