@@ -41,7 +41,7 @@ CODINGS: dict[Codec, _Coding] = {
         encoder="libvpx-vp9",
         container="mp4",
         pixels="yuv420p",
-        options={"crf": "20", "b": "0", "deadline": "realtime", "cpu-used": "7", "row-mt": "1"},
+        options={"crf": "20", "b": "0", "deadline": "realtime", "cpu-used": "8", "row-mt": "1"},
     ),
     # a sixth of the other encoder's time, for a third more bytes; profile 2 is standard
     "prores": _Coding(encoder="prores_aw", container="mov", pixels="yuv422p10le", options={"profile": "2"}),

@@ -51,8 +51,8 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 
 @dataclass(frozen=True, kw_only=True)
 class ShownPlates:
-    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape and what ``makes`` rows, given
-    to every thread by itself."""
+    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape; ``makes`` gives every
+    thread what makes rows."""
 
     samples: list[Samples]
     makes: Callable[[], MakeRows] | None = None
