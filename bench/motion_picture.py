@@ -15,7 +15,7 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import illumination
 from psvideo.synth import read_scene
-from psvideo.synth.scene import MotionTable
+from psvideo.synth.scene_tables import MotionTable
 from psvideo.synth.stage import set_stage
 
 STEP_PX, FULL_DEG, GREY = 4.0, 10.0, 110

@@ -13,7 +13,7 @@ from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.camera.dpx_writer import dpx_bytes
 from psvideo.synth.camera.encode import Codes
 from psvideo.synth.camera.frames import write_frame
-from psvideo.synth.scene import CameraTable
+from psvideo.synth.scene_tables import CameraTable
 
 QUALITY = 18
 """Constant rate factor of H.264: about what a camera's best setting gives."""

@@ -28,7 +28,7 @@ from psvideo.synth.camera.frames import write_frame
 from psvideo.synth.camera.noise import frame_rng
 from psvideo.synth.camera.sensor import expose_frames
 from psvideo.synth.lamps.true_flashes import true_flashes
-from psvideo.synth.scene import CameraTable
+from psvideo.synth.scene_tables import CameraTable
 
 Kind = Literal["tiff", "exr", "dng", "prores", "h264"]
 Image = NDArray[np.float32]

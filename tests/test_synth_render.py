@@ -13,7 +13,7 @@ import trimesh
 from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.scene import AlbedoTable, AmbientTable, CameraTable, ObjectTable
+from psvideo.synth.scene_tables import AlbedoTable, AmbientTable, CameraTable, ObjectTable
 from psvideo.synth.subject.body import make_body
 from psvideo.synth.subject.material import layered_noise, pattern_albedo
 from psvideo.synth.subject.meshes import builtin_names, builtin_shape

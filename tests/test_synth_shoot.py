@@ -325,6 +325,7 @@ def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
         ("direction = [0.3, 0.3, 0.9]", "direction = [0.3, 0.3]", r"light\[1\].direction"),
         ("direction = [0.3, 0.3, 0.9]", "", "needs direction .distant. or position_m"),
         ('name = "left"', 'name = "key"', "two lights have the name 'key'"),
+        ("frames = 8", 'frames = 8\n[output]\n[[other_camera]]\nname = "virtual camera"', "two cameras have the name"),
         ('mesh = "sphere"', 'mesh = "spere"', "spere"),
         ("width_m = 1.4", 'view = "perspective"', "a perspective view needs focal_px"),
         ("width_m = 1.4", 'cfa = "RGBG"', "camera.cfa"),
@@ -360,7 +361,7 @@ def test_shipped_scenes_are_sound(path: Path) -> None:
     scene = read_scene(path)
     plan, rig = true_plan(scene), true_rig(scene)
     assert plan.lights == rig.names
-    assert scene.frames * plan.camera.frame_period_s > plan.cycle_s
+    assert (scene.frames * plan.camera.frame_period_s > plan.cycle_s) == (plan.dark_code == 0)
     directions = np.array([light.direction for light in rig.lights])
     assert np.linalg.cond(directions) < 4
 
@@ -371,7 +372,7 @@ def test_the_shipped_scenes_are_found_by_name(tmp_path: Path, monkeypatch: pytes
         assert scene_file(Path(path.stem)) == builtin_scene(path.stem)
         assert builtin_scene(path.stem).read_bytes() == path.read_bytes()
     assert set(builtin_scenes()) == {path.stem for path in SCENES} >= {"bust", "fan", "still_life", "sphere", "gloss"}
-    with pytest.raises(PsvideoError, match=r"bist: is neither a file nor .*those are bust, colour, fan"):
+    with pytest.raises(PsvideoError, match=r"bist: is neither a file nor .*those are bust, cameras, colour"):
         scene_file(Path("bist"))
 
 

@@ -2,9 +2,10 @@
 
 It never uses the code that it tests: how a row integrates light is computed here by another method.
 
-``shoot`` does it: begin there. It reads a ``scene`` (``scenes`` finds those that come with psvideo), makes plan, rig
-and clock of it (``shotplan``), sets it up from ``subject`` and ``lamps`` (``stage``), films it with ``camera``, and
-writes the ``truth`` beside the clip.
+``shoot`` does it: begin there. It reads a ``scene`` of ``scene_tables`` (``scenes`` finds those that come with
+psvideo; ``other_cameras`` gives it as another of its cameras films it), makes plan, rig and clock of it (``shotplan``),
+sets it up from ``subject`` and ``lamps`` (``stage``), films it with ``camera``, and writes the ``truth`` beside the
+clip.
 """
 
 from psvideo.synth.camera.exposure import Exposure, expose

@@ -1,4 +1,4 @@
-"""The scenes that come with psvideo, found by name: bust, colour, fan, gloss, sphere, still_life.
+"""The scenes that come with psvideo, found by name: bust, cameras, colour, fan, gloss, sphere, still_life.
 
 Their one home is data_synth/ of the repository; installing copies them into the package (setup.py), to scenes/ beside
 this module.

@@ -23,6 +23,7 @@ from psvideo.synth.camera.noise import frame_rng
 from psvideo.synth.camera.sensor import MainsSwing, expose_frames
 from psvideo.synth.lamps.traced import TraceOptions, traced_light
 from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, true_flashes
+from psvideo.synth.other_cameras import filmed_by
 from psvideo.synth.scene import read_scene
 from psvideo.synth.scenes import scene_file
 from psvideo.synth.shotplan import claimed_plan, true_clock
@@ -50,17 +51,26 @@ class VirtualTake:
 
 
 def shoot(
-    scene: Path | str, out: Path | str, *, force: bool = False, track: Track = iter, trace: TraceOptions | None = None
+    scene: Path | str,
+    out: Path | str,
+    *,
+    camera: str | None = None,
+    force: bool = False,
+    track: Track = iter,
+    trace: TraceOptions | None = None,
 ) -> VirtualTake:
     """Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it.
 
     Parameters
     ----------
     scene
-        A scene file, or the name of one that comes with psvideo: bust, colour, fan, gloss, sphere, still_life.
+        A scene file, or the name of one that comes with psvideo: bust, cameras, colour, fan, gloss, sphere,
+        still_life.
     out
         The clip folder to write, whole or not at all: frames/, plan.toml and rig.toml as a camera and its crew would
         leave them, and truth/ with what only the virtual shoot knows.
+    camera
+        Which of a scene's cameras films, by its name; the first where left out.
     force
         Replaces an earlier virtual clip of that name.
     track
@@ -77,7 +87,7 @@ def shoot(
     Raises
     ------
     UsageError
-        Where ``out`` exists and ``force`` is not given.
+        Where ``out`` exists and ``force`` is not given; where the scene does not have that ``camera``.
     PsvideoError
         For a faulty scene or mesh, or where writing fails.
 
@@ -90,7 +100,7 @@ def shoot(
     scene, out = path_of("scene", scene), path_of("out", out)
     _refuse_footage(out, force=force)
     file = scene_file(scene)
-    stage = set_stage(read_scene(file), file.parent)
+    stage = set_stage(filmed_by(read_scene(file), camera, source=str(file)), file.parent)
     with whole_folder(out, mark="truth/scene.json", force=force) as folder, _nothing_left(folder, out):
         (folder / "frames").mkdir()
         return _film(stage, folder, out, track, trace)

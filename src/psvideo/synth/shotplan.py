@@ -10,7 +10,8 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector, vector
 from psvideo.synth.camera.encode import codes_of
 from psvideo.synth.lamps.true_flashes import TrueClock
-from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
+from psvideo.synth.scene import Scene
+from psvideo.synth.scene_tables import CameraTable, Kind, LightTable
 
 
 def camera_of(table: CameraTable, kind: Kind) -> Camera:

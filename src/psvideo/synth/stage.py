@@ -35,7 +35,7 @@ class Stage:
 
     def view(self, time_s: float) -> SeenScene:
         """Return what the camera sees at a time on its clock."""
-        return self.still or cast_rays(self.bodies, self.scene.camera, time_s)
+        return self.still or cast_rays(self.bodies, self.scene.camera, self.scene.starts_s + time_s)
 
     def plate(self, flash: TrueFlash, view: SeenScene) -> Image:
         """Return the scene as one whole flash lights it; averaged over the flash where the scene asks for that."""
@@ -76,5 +76,5 @@ def _subject_m(scene: Scene, bodies: Sequence[Body]) -> float | None:
     """Return how far before the lens the scene's first body stands, as a tape shows it; None where nobody needs it."""
     if all(light.position_m is None for light in scene.light) or not bodies:
         return None
-    depth_m = -cast_rays(bodies[:1], scene.camera, 0.0).hits.point_m[:, 2]
+    depth_m = -cast_rays(bodies[:1], scene.camera, scene.starts_s).hits.point_m[:, 2]
     return float(np.median(depth_m)) if len(depth_m) else None

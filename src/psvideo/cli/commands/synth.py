@@ -20,10 +20,16 @@ if TYPE_CHECKING:
 def synth(
     scene: Annotated[
         Path,
-        typer.Argument(help="A scene file, or a scene of psvideo: bust, colour, fan, gloss, sphere, still_life."),
+        typer.Argument(
+            help="A scene file, or a scene of psvideo: bust, cameras, colour, fan, gloss, sphere, still_life."
+        ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The clip folder to write.")],
     *,
+    camera: Annotated[
+        str | None,
+        typer.Option("--camera", metavar="NAME", help="Which of the scene's cameras films; left out, the first."),
+    ] = None,
     trace: Annotated[
         Path | None,
         typer.Option("--trace", help="Light the scene by the edges of psvideo strobe emulate --trace FILE."),
@@ -41,6 +47,7 @@ def synth(
     shot = shoot(
         scene,
         out,
+        camera=camera,
         force=force,
         track=lambda frames: voice.track(frames, total=len(frames), what="filming"),
         trace=_trace_options(trace, parse_lines(line)),

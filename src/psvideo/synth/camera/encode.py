@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Image
 from psvideo.synth.camera.curves import CURVES, CameraCurve
 from psvideo.synth.camera.noise import Noise
-from psvideo.synth.scene import CameraTable, Kind
+from psvideo.synth.scene_tables import CameraTable, Kind
 
 COLOURS = {"R": 0, "G": 1, "B": 2}
 

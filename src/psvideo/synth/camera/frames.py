@@ -11,7 +11,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import write_exr
 from psvideo.synth.camera.dpx_writer import dpx_bytes
 from psvideo.synth.camera.encode import Codes
-from psvideo.synth.scene import CameraTable, Kind
+from psvideo.synth.scene_tables import CameraTable, Kind
 
 SUFFIX: dict[Kind, str] = {"png16": ".png", "png8": ".png", "tif": ".tif", "exr": ".exr", "dng": ".dng", "dpx": ".dpx"}
 CFA_CODES = {"R": 0, "G": 1, "B": 2}

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles, Floats
-from psvideo.synth.scene import AlbedoTable, ObjectTable
+from psvideo.synth.scene_tables import AlbedoTable, ObjectTable
 from psvideo.synth.subject.material import PLAIN, colour, pattern_albedo, sample_texture
 from psvideo.synth.subject.meshes import builtin_names, builtin_shape
 from psvideo.synth.subject.shape import Shape, load_shape, load_texture

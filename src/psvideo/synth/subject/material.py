@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles, Floats
-from psvideo.synth.scene import AlbedoTable, Colour
+from psvideo.synth.scene_tables import AlbedoTable, Colour
 
 Keys = NDArray[np.uint64]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles, Floats
-from psvideo.synth.scene import CameraTable
+from psvideo.synth.scene_tables import CameraTable
 from psvideo.synth.subject.body import Body
 from psvideo.synth.subject.rays import Caster, barycentric
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Doubles, Floats
 from psvideo.model.rig import Light, Rig
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.scene import AmbientTable
+from psvideo.synth.scene_tables import AmbientTable
 from psvideo.synth.subject.material import colour
 from psvideo.synth.subject.render import Hits, SeenScene, unit_vectors
 
