@@ -313,6 +313,38 @@ def test_a_lit_ball_that_leaves_the_picture_is_not_taken_for_lamps_that_flicker(
     assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).swing is None
 
 
+def test_a_subject_whose_bright_rows_grow_brighter_is_not_taken_for_a_camera_whose_gain_changes(plan: Plan) -> None:
+    """A bust turned its chest to the lights and its face away. Its chest held nine tenths of the squares, so that one
+    gain explained most of what changed."""
+    row = np.arange(ROWS)[:, None]
+    chest, face = (np.exp(-(((row - at) / 8) ** 2)) for at in (44, 16))
+    texture = 0.5 + np.random.default_rng(3).random((ROWS, COLUMNS))
+
+    def plate_of(flash: TrueFlash) -> np.ndarray:
+        turned = 0.25 * np.sin(2 * np.pi * flash.start_s / (FRAMES * plan.camera.frame_period_s))
+        lit = 0.3 * (1 + turned) * chest + 0.1 * (1 - turned) * face
+        return np.asarray((flash.slot in plan.lit_slots) * lit * texture, np.float32)
+
+    shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
+    assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).swing is None
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_slow_changes_of_a_camera_s_gain_are_not_blamed_on_lamps_alone(plan: Plan, seed: int) -> None:
+    """Between two frames whose gains hardly differ a flash's own explains as much; and no gain was given to frames that
+    see hardly any light, so that those of flashes left less over."""
+    rng = np.random.default_rng(seed)
+    row = np.arange(ROWS)[:, None] / ROWS
+    shape = 0.02 + np.exp(-(((row - rng.uniform(0.3, 0.7)) / rng.uniform(0.1, 0.3)) ** 2))
+    plates = {slot: (0.6 * shape * rng.random((ROWS, COLUMNS))).astype(np.float32) for slot in plan.lit_slots}
+    clock = TrueClock(phase_s=0.0123, offset_ppm=30)
+    shot = expose(plates, plan, frames=72, clock=clock, noise=NOISE, bits=12)
+    gain = 1 + 0.1 * np.sin(np.arange(72) / 9)
+    swing = timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64) * gain[:, None]).swing
+    assert swing is not None
+    assert swing.cause != "lamps"
+
+
 @pytest.mark.parametrize("period", [7.0, 3.0])
 def test_a_camera_whose_gain_swings_is_not_taken_for_lamps_that_flicker(plan: Plan, period: float) -> None:
     timing = timing_of(plan, filmed(plan, gain=1 + 0.15 * np.sin(np.arange(FRAMES) / period)))
