@@ -2,7 +2,8 @@
 
 Time is virtual, the board's clock and the camera's apart: 900 ppm and a warm-up of 5 ppm a minute, a wander of 30 ppm
 in 44 s, flashes that jitter by 2 microseconds. ``python -m bench.genlock --minutes 10``; by hours where it is asked.
-``--firmware`` takes the boards' own program in emulation in place of the board in Python.
+``--firmware`` takes the AVR boards' own program in emulation in place of the board in Python, ``--pico`` the Pico's on
+the model of its chip.
 """
 
 import argparse
@@ -18,6 +19,7 @@ from bench.table import Row, table
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "models"))  # the loop that the tests film in
 
 from firmware_board import firmware_board
+from pico import Pico
 from strobed_loop import StrobedLoop
 
 from psvideo.live.following.genlock import rows_around, target_of
@@ -43,11 +45,19 @@ def firmware_rows(minutes: float = MINUTES) -> Iterator[Row]:
         yield from _held(loop, minutes)
 
 
+def pico_rows(minutes: float = MINUTES) -> Iterator[Row]:
+    """Yield the same of the Pico's program."""
+    yield from _held(
+        StrobedLoop(plan=_plan(), offset_ppm=_offset_ppm, jitter_s=JITTER_S, seed=2, board=Pico()), minutes
+    )
+
+
 def _held(loop: StrobedLoop, minutes: float) -> Iterator[Row]:
     for _ in loop.film(4.0):
         if loop.chain.state == "locked":
             break
-    holding = Holding(chain=loop.chain, target=target_of(loop.plan.camera, ROW), ask=loop.ask)
+    lead_s = 1e-3 * loop.board.board.trim_lead_ms
+    holding = Holding(chain=loop.chain, target=target_of(loop.plan.camera, ROW), ask=loop.ask, lead_s=lead_s)
     around, began_s = rows_around(loop.plan.camera), loop.host_s
     worst = 0.0
     for at_s in loop.film(AFTER_S + 60 * minutes, holding):
@@ -74,9 +84,11 @@ def main() -> int:
     """Hold it for as long as is asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=MINUTES)
-    parser.add_argument("--firmware", action="store_true", help="the boards' program in emulation")
+    parser.add_argument("--firmware", action="store_true", help="the AVR boards' program in emulation")
+    parser.add_argument("--pico", action="store_true", help="the Pico's program on a model of its chip")
     asked = parser.parse_args()
-    print(table((firmware_rows if asked.firmware else rows)(asked.minutes)))
+    made = firmware_rows if asked.firmware else pico_rows if asked.pico else rows
+    print(table(made(asked.minutes)))
     return 0
 
 

@@ -197,12 +197,19 @@ def test_the_pico_has_direct_wiring_only_and_the_uno_both() -> None:
     assert b"wiring=direct lines=2 powers=2" in uno.feed(b"CAPS\n", 0)
 
 
-def test_the_pico_takes_no_trim_but_none() -> None:
-    pico = PythonBoard(BOARDS["rp2040"])
-    arm = b"ARM %d\n" % cycle_check([Slot(slot=0, duration=1000, dark=10**6, period=1000, lit=())])
-    tell(pico, b"SLOT 0 1000 1000000 1000\n", b"STEPS 0 0\n", arm, b"RUN 0\n", now=0)
-    assert pico.feed(b"TRIM sooner 1\n", 10**6).startswith(b"E 7 ")
-    assert pico.feed(b"TRIM later 0\n", 2 * 10**6) == b"OK way=later ppm=0\n"
+@pytest.mark.parametrize(("name", "counts_from"), [("atmega328p", 3), ("rp2040", 4)])
+def test_a_trim_counts_behind_the_next_step_and_not_before_the_boards_lead(name: str, counts_from: int) -> None:
+    """Steps of 8 ms, of which the second is played: the Pico takes the first that begins 20 ms later."""
+    controller, ms = PythonBoard(BOARDS[name]), 10**9 // BOARDS[name].tick_ps
+    slot = Slot(slot=0, duration=ms, dark=7 * ms, period=ms, lit=(Lit(line=0, on=ms),))
+    said = f"SLOT 0 {ms} {7 * ms} {ms} 0:{ms}\nSTEPS 0 0\nARM {cycle_check([slot])}\nRUN 0\n"
+    tell(controller, said.encode(), now=0)
+    assert controller.feed(b"TRIM later 20000\n", (10 + 8 + 1) * ms) == b"OK way=later ppm=20000\n"
+    controller.advance(100 * ms)
+    ticks = [edge.tick for edge in controller.edges if edge.level]
+    lasts = [after - before for before, after in pairwise(ticks)]
+    assert lasts[:counts_from] == [8 * ms] * counts_from
+    assert set(lasts[counts_from:]) == {8 * ms + 8 * ms // 50}
 
 
 def test_an_answer_has_a_checksum_where_the_request_had_one() -> None:

@@ -57,14 +57,16 @@ def test_it_uses_only_what_micropython_has() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_it_answers_and_lays_out_the_same_under_micropython(seed: int, tmp_path: Path) -> None:
-    lines = [*LOADED.decode().splitlines(), ARM.decode().strip(), "RUN 2", "CLK a", "STOP", "ID*A21C", "KEEP 1", "CAPS"]
-    lines += ["STEPS 0 x", "SLOT 0 1000 16000 250 0:124", "ARM 1", "WHAT", "STAT", "NEW", *upload(random.Random(seed))]
+    lines = [*LOADED.decode().splitlines(), ARM.decode().strip(), "RUN 2", "TRIM sooner 3001", "CLK a", "STOP", "CAPS"]
+    lines += ["ID*A21C", "KEEP 1", "STEPS 0 x", "SLOT 0 1000 16000 250 0:124", "ARM 1", "WHAT", "STAT", "NEW"]
+    lines += [*upload(random.Random(seed), darker=12_500), "RUN 0", "TRIM later 20000"]
     script = tmp_path / "asked.py"
     script.write_text(_under_micropython(lines), encoding="utf-8")
     said = subprocess.run([*micropython(), script], capture_output=True, text=True, check=True).stdout.splitlines()
     here: dict[str, Any] = {"printed": []}
     exec(script.read_text(encoding="utf-8").replace("print(", "printed.append("), here)
     assert said == [str(line) for line in here["printed"]]
+    assert [line.split()[0] for line in said if "way=" in line] == ["OK", "OK"], "and trimmed"
     assert sum(line.startswith("OK check=") for line in said) == 2, "both cycles are armed"
 
 
@@ -85,13 +87,16 @@ def _under_micropython(lines: list[str]) -> str:
 class Still:
     def __init__(self):
         memory = lambda words: (array("I", bytes(4 * words)), 0, 0x20000000)
-        self.links = [Link(group, [1, 2, 3], memory(TABLE_WORDS), memory(TURNS)) for group in range(GROUPS)]
+        self.links = [Link(group, [1, 2, 3, 4], memory(TABLE_WORDS), memory(TURNS)) for group in range(GROUPS)]
+        self.pace = memory(RING)
     def ticks(self):
         return 0
     def interlock_open(self):
         return False
     def starved(self):
         return False
+    def read_places(self):
+        return [0, 0]
     def darken(self):
         pass
     def start(self, leads):
@@ -101,4 +106,5 @@ for line in {lines!r}:
     print(controller.feed((line + chr(10)).encode()).decode().strip())
 for table in controller.tables:
     print(crc16(bytes(table.link.memory[0])))
+print([crc16(bytes(controller.pace.words)), controller.pace.written, controller.pace.carried])
 """

@@ -16,7 +16,7 @@ from pioemu import State, emulate  # type: ignore[attr-defined]
 from rp2040 import MOV_PINS_NULL, Chip, board_of
 
 from psvideo.strobe.link.requests import Lit, Slot
-from psvideo.strobe.stand_ins.playing import moments
+from psvideo.strobe.stand_ins.playing import Trimming, moments
 
 LEAD = 1_250_000
 ROUNDS = 3
@@ -35,17 +35,32 @@ def assembled(play: FunctionType) -> adafruit_pioasm.Program:
     return adafruit_pioasm.Program("\n".join(text))
 
 
-def words_of(cycle: Sequence[Slot], rounds: int) -> list[list[int]]:
-    """Return what the DMA brings to each state machine behind the lead, as the table makes it."""
+def words_of(cycle: Sequence[Slot], rounds: int, trims: Sequence[tuple[int, int]] = ()) -> list[list[int]]:
+    """Return what the DMA brings to each state machine behind the lead, as the table makes it.
+
+    A trim (ppm, the step from which it counts) is written while the first group has read up to the step before that
+    one, and the other group hardly anything.
+    """
     chip = Chip()
     board = board_of(PROGRAM, chip)
     slots = [(slot.duration, slot.dark, slot.period, [(lit.line, lit.on) for lit in slot.lit]) for slot in cycle]
+    pace = PROGRAM.Pace(board.pace)
+    ending = pace.lay_out([slot.duration + slot.dark for slot in cycle], min(slot.dark for slot in cycle))
+    pace.wind(rounds)
     tables = [PROGRAM.Table(group, link) for group, link in enumerate(board.links)]
     for table in tables:
-        table.lay_out(slots, range(len(slots)))
+        table.lay_out(slots, range(len(slots)), ending)
         table.wind(rounds)
     board.start([table.lead_address for table in tables])
-    words = [list(iter(partial(chip.take_word, group), None)) for group in (0, 1)]
+    pace.begin(0)
+    words: list[list[Any]] = [[], []]
+    for ppm, since in trims:
+        while board.read_places()[0] < since - 1:
+            words[0].append(chip.take_word(0))
+        pace.trim(ppm, since)
+        pace.write()
+    for group in (0, 1):
+        words[group] += iter(partial(chip.take_word, group), None)
     assert all(of_group[:2] == [0, LEAD - 10] for of_group in words)
     return [of_group[2:] for of_group in words]
 
@@ -71,10 +86,22 @@ def play(opcodes: Sequence[int], words: Sequence[int], until: int) -> list[tuple
     return changes
 
 
-def expected(cycle: Sequence[Slot], rounds: int, group: int) -> list[tuple[int, int]]:
+def extras(cycle: Sequence[Slot], rounds: int, trims: Sequence[tuple[int, int]]) -> list[int]:
+    """Return by how many ticks the controller in Python makes each step longer."""
+    trimming, longer = Trimming(steps=cycle), list[int]()
+    for ppm, since in [*trims, (0, len(cycle) * rounds)]:
+        longer += [trimming.extra(step) for step in range(len(longer), since)]
+        trimming.trim(ppm, step=since - 2, not_before=0)
+    return longer
+
+
+def expected(
+    cycle: Sequence[Slot], rounds: int, group: int, trims: Sequence[tuple[int, int]] = ()
+) -> list[tuple[int, int]]:
     """Return the same from the cycle's edges."""
     pins, changes = 0, {}
-    for moment in moments(cycle, start=0, cycles=rounds):
+    longer = extras(cycle, rounds, trims)
+    for moment in moments(cycle, start=0, cycles=rounds, extra=lambda step: longer[step]):
         if moment.edge is not None and moment.edge.line // 4 == group:
             pins ^= 1 << moment.edge.line % 4
             changes[moment.tick] = pins
@@ -118,6 +145,16 @@ def test_edges_of_random_cycles_are_too(seed: int) -> None:
     length = ROUNDS * sum(slot.duration + slot.dark for slot in cycle)
     for group, words in enumerate(words_of(cycle, ROUNDS)):
         assert play(assembled(PROGRAM.play).assembled, words, length) == expected(cycle, ROUNDS, group)
+
+
+@pytest.mark.parametrize("trims", [[(20_000, 2)], [(-20_000, 3)], [(777, 2), (-12_345, 5), (0, 9)]])
+@pytest.mark.parametrize("name", ["one line after the other", "a last burst that is cut", "full power beside bursts"])
+def test_both_groups_make_every_edge_in_its_clock_cycle_over_trims(name: str, trims: list[tuple[int, int]]) -> None:
+    cycle, rounds = CYCLES[name] * 2, 8
+    assert any(extras(cycle, rounds, trims))
+    length = rounds * sum(slot.duration + slot.dark for slot in cycle) + sum(extras(cycle, rounds, trims))
+    for group, words in enumerate(words_of(cycle, rounds, trims)):
+        assert play(assembled(PROGRAM.play).assembled, words, length) == expected(cycle, rounds, group, trims)
 
 
 def test_the_program_wraps_around_and_fits() -> None:

@@ -91,7 +91,7 @@
 #define MIN_ON_US 20UL
 #define MIN_OFF_US 20UL
 #define TOLERANCE_PPM 5000UL
-#define TRIMS 1UL
+#define TRIM_LEAD_MS 0UL
 #endif
 #ifdef __AVR_ATmega2560__
 #define BOARD_NAME "atmega2560"
@@ -105,6 +105,6 @@
 #define MIN_ON_US 20UL
 #define MIN_OFF_US 20UL
 #define TOLERANCE_PPM 5000UL
-#define TRIMS 1UL
+#define TRIM_LEAD_MS 0UL
 #endif
 #endif

@@ -71,6 +71,7 @@ MIN_DARK = 100 * TICKS_PER_US
 MAX_FLASH = 50 * TICKS_PER_MS
 MAX_LINE_PPM, MAX_TOTAL_PPM = 500000, 2000000
 MAX_CYCLE = 60000 * TICKS_PER_MS
+MAX_TRIM_PPM = 20000
 START_DELAY = 10 * TICKS_PER_MS
 
 
@@ -205,18 +206,30 @@ def lit_ticks(slot):
 
 
 def check_cycle(slots):
-    """Refuse a cycle that is lit too much or lasts too long; returns its length."""
+    """Refuse a cycle that is lit too much or lasts too long; returns its length, and for how long lines are on."""
     cycle = sum([slot[0] + slot[1] for slot in slots])
     each = [lit_ticks(slot) for slot in slots]
-    lines = [sum([ticks[line] for ticks in each]) for line in range(LINES)]
-    for line, ticks in enumerate(lines):
+    lit = [sum([ticks[line] for ticks in each]) for line in range(LINES)]
+    _check_shares(cycle, lit)
+    return cycle, lit
+
+
+def _check_shares(cycle, lit):
+    for line, ticks in enumerate(lit):
         if ticks * 1000000 // cycle > MAX_LINE_PPM:
             raise RefusedError("limit", f"line {line} {ticks * 1000000 // cycle} ppm > max_line_ppm {MAX_LINE_PPM}")
-    if sum(lines) * 1000000 // cycle > MAX_TOTAL_PPM:
-        raise RefusedError("limit", f"total {sum(lines) * 1000000 // cycle} ppm > max_total_ppm {MAX_TOTAL_PPM}")
+    if sum(lit) * 1000000 // cycle > MAX_TOTAL_PPM:
+        raise RefusedError("limit", f"total {sum(lit) * 1000000 // cycle} ppm > max_total_ppm {MAX_TOTAL_PPM}")
     if cycle > MAX_CYCLE:
         raise RefusedError("limit", f"cycle {cycle} > {MAX_CYCLE}")
-    return cycle
+
+
+def check_trim(ppm, cycle, lit, steps, shortest_dark):
+    """Refuse to have a cycle's steps last longer by so many ppm, or shorter below 0; ``lit`` is check_cycle's."""
+    if shortest_dark + cycle * ppm // (1000000 * steps) < 2 * MIN_DARK:
+        raise RefusedError("limit", f"dark < 2 min_dark {2 * MIN_DARK}")
+    ticks = cycle * abs(ppm) // 1000000 + 1
+    _check_shares(cycle - ticks if ppm < 0 else cycle + ticks, lit)
 
 
 def check_of(slots):
@@ -242,7 +255,9 @@ GROUPS, GROUP_LINES = 2, 4  # two state machines in step, four lines each
 STATES = 8  # an entry is a word of eight states, a tick each, and a word that says how much longer the last one lasts
 SHORTEST = 10  # ticks of an entry: eight states, the delay's fetch, one pass of its loop
 STEADY = 0x11111111  # times a state: that state eight times
-TABLE_WORDS = 3300  # the longest table: 32 slots of bursts and 240 steps
+SPARE_DARK = 20 * SHORTEST  # ticks of a dark time that stay on either side of where it is parted
+TAIL_ENTRIES = 5  # or more: a FIFO and the register behind it hold nine words, so no tail is read ahead as a whole
+TABLE_WORDS = 4000  # the longest table: 32 slots of bursts and 240 steps
 TURNS = 1024  # whole cycles that the DMA counts by itself
 
 
@@ -294,8 +309,18 @@ def padded(made):
     return made
 
 
-def parts(slot, group):
-    """What a group of lines does in a flash: how many bursts, one burst, and the last burst with the dark time."""
+def long_enough(made):
+    """The same with TAIL_ENTRIES or more, by parting the last wait, in which it is dark."""
+    word, wait = made[-1]
+    more = max(TAIL_ENTRIES - len(made), 0)
+    return made[:-1] + [(word, wait - SHORTEST * more)] + [(0, 0)] * more
+
+
+def parts(slot, group, ending):
+    """What a group of lines does in a flash: how many bursts, one burst, and its tail.
+
+    That is the last burst with the dark time, but for its last ticks (``ending``).
+    """
     duration, dark, period, lit = slot
     on = [(1 << line % GROUP_LINES, ticks) for line, ticks in lit if line // GROUP_LINES == group]
     if not [ticks for _, ticks in on if ticks < period]:
@@ -304,7 +329,8 @@ def parts(slot, group):
     bursts = (duration - 1) // period
     last = duration - bursts * period
     burst = padded(entries(on, period)) if bursts else []
-    return bursts, burst, entries([(bit, min(ticks, last)) for bit, ticks in on], last + dark)
+    tail = entries([(bit, min(ticks, last)) for bit, ticks in on], last + dark - ending)
+    return bursts, burst, long_enough(tail)
 
 
 def control_word(treq, chain_to, inc_write=0, ring_bits=0, ring_write=0):
@@ -316,11 +342,12 @@ def control_word(treq, chain_to, inc_write=0, ring_bits=0, ring_write=0):
 class Table:
     """One group's cycle in memory: entries, and the control blocks by which the DMA walks through them for ever.
 
-    ``turns`` are what the DMA reads behind every cycle: the address of the next one's blocks, or 0 to stop.
+    ``turns`` are what the DMA reads behind every cycle: the address of the next one's blocks, or 0 to stop. The table's
+    first entry is the dark time's ending of every step: the DMA puts its wait there, a step's word of the ring (pace).
     """
 
     def __init__(self, group, link):
-        """``link`` has fifo, treq (of the state machine), control, turn (channels), memory and turns (aligned)."""
+        """``link`` has fifo, treq (of the state machine), control, turn, pace (channels), memory, turns (aligned)."""
         self.group = group
         self.link = link
         self.used = 0
@@ -342,14 +369,18 @@ class Table:
     def _put_block(self, address, count, chain_to, ring_bits=0):
         return self._put(address, self.link.fifo, count, control_word(self.link.treq, chain_to, 0, ring_bits))
 
-    def lay_out(self, slots, steps):
-        """Write the cycle; slots' entries are there once, however often the steps name them."""
+    def lay_out(self, slots, steps, ending):
+        """Write the cycle; slots' entries are there once, however often the steps name them.
+
+        ``ending`` is how many ticks of every dark time are not the tail's.
+        """
         self.used = 0
+        dark, _ = self._put_entries([(0, 0)])
         lead = self._put_entries([(0, START_DELAY - SHORTEST)])
         placed = {}
         for step in steps:
             if step not in placed:
-                bursts, burst, tail = parts(slots[step], self.group)
+                bursts, burst, tail = parts(slots[step], self.group, ending)
                 ring = self._put_entries(burst, 2 * len(burst)) if bursts else (0, 0)
                 placed[step] = (bursts, ring, self._put_entries(tail))
         self.lead_address = self._put_block(lead[0], lead[1], self.link.control)
@@ -359,7 +390,8 @@ class Table:
             if bursts:
                 bits = [1 << bit for bit in range(8)].index(4 * ring[1])
                 self._put_block(ring[0], bursts * ring[1], self.link.control, bits)
-            self._put_block(tail[0], tail[1], self.link.turn if place + 1 == len(steps) else self.link.control)
+            self._put_block(tail[0], tail[1], self.link.pace)
+            self._put_block(dark, 2, self.link.turn if place + 1 == len(steps) else self.link.control)
 
     def wind(self, cycles):
         """Have it play for ever, or that many cycles if they are not more than TURNS."""
@@ -375,6 +407,132 @@ class Table:
         words[first + (cycles - 1) % TURNS] = 0
 
 
+# pace -----------------------------------------------------------------------------------------------------------------
+# How long the steps of a run last: a word for each of them in a ring of memory that the DMA reads, one in every step.
+#
+# Both groups read the same ring, so they stay in step whatever stands there, as long as no word changes between the two
+# readings of one step. Therefore words are written at least a step ahead, and looked after once they are written.
+
+
+RING = TURNS  # steps that have a word of their own; trimmed steps last 0.2 ms or more, so these last 200 ms or more
+AHEAD = RING - 8  # words that are written ahead of the step that is played
+CHUNK = 128  # words that are written at once: more than the steps of LEAD, and as many as last 25 ms or more
+LEAD = 20 * TICKS_PER_MS  # a trim counts this much after it was asked for, so that memory may be collected before
+
+
+class Pace:
+    """Where a run is, and how long its steps last: as uploaded, or longer or shorter by a trim, in whole ticks.
+
+    ``step`` is the step that is played, counted from the run's start, and ``at`` the tick in which it begins. A tick is
+    cut into ``parts``, of which a trim adds the same number to every step; what is no whole tick is carried on.
+    """
+
+    def __init__(self, memory):
+        """``memory`` is the ring: words, the place of the first, and its address."""
+        self.words, self.first, _ = memory
+        self.lengths = [0]
+
+    def lay_out(self, lengths, shortest_dark):
+        """Take a cycle's steps. Returns how many ticks at each dark time's end the ring's words stand for."""
+        self.lengths = lengths
+        self.cycle = sum(lengths)
+        self.parts = 1000000 * len(lengths)
+        most_shorter = self.cycle * MAX_TRIM_PPM // self.parts + 1
+        self.ending = min(most_shorter + SPARE_DARK, shortest_dark - SPARE_DARK)
+        return self.ending
+
+    def wind(self, cycles):
+        """Be ahead of a run of that many cycles (0: without end), all as uploaded."""
+        for place in range(RING):
+            self.words[self.first + place] = self.ending - SHORTEST
+        self.last = cycles * len(self.lengths) or None
+        self.step = self.carried = self.since = 0
+        self.share = (0, 0)
+        self.written = None  # steps that have their words; None: all, as they are as uploaded
+
+    def begin(self, tick):
+        """The run's first flash starts in that tick."""
+        self.at = tick
+
+    def is_over(self):
+        return self.step == self.last
+
+    def position(self):
+        """The cycle and the step in it."""
+        return divmod(self.step, len(self.lengths))
+
+    def advance(self, now):
+        """Go on to the step that is played now, or to the run's end."""
+        self.step, self.at = self.walk(now)
+
+    def walk(self, now):
+        """The step that is played now and the tick in which it began, as far as steps have their words."""
+        step, at = self.step, self.at
+        if self.written is None and now - at >= self.cycle:
+            cycles = (now - at) // self.cycle
+            if self.last is not None:
+                cycles = min(cycles, (self.last - step) // len(self.lengths))
+            step += cycles * len(self.lengths)
+            at += cycles * self.cycle
+        while step not in (self.last, self.written):
+            end = at + self._length(step)
+            if end > now:
+                break
+            step, at = step + 1, end
+        return step, at
+
+    def _length(self, step):
+        word = self.words[self.first + step % RING]
+        return self.lengths[step % len(self.lengths)] + word + SHORTEST - self.ending
+
+    def counts_from(self, now):
+        """From which step on a trim counts that is asked for now: behind the next one, and LEAD later or more."""
+        step, at = self.step, self.at
+        while step < self.step + 2 or at < now + LEAD:
+            at += self._length(step)
+            step += 1
+        return step
+
+    def trim(self, ppm, since):
+        """Have the steps from ``since`` on last by so many ppm longer, or shorter below 0; they lose their words."""
+        if self.written is not None:
+            self.carried = (self.carried - (self.written - since) * self.share[1]) % self.parts
+        self.share = divmod(self.cycle * ppm, self.parts)
+        self.since = self.written = since
+
+    def write(self):
+        """Give the next steps their words. Returns the first of them."""
+        whole, rest = self.share
+        begin, carried = self.written, self.carried
+        end = min(begin + CHUNK, self.step + AHEAD)
+        for step in range(begin, end):
+            carried += rest
+            word = self.ending + whole - SHORTEST
+            if carried >= self.parts:
+                carried -= self.parts
+                word += 1
+            self.words[self.first + step % RING] = word
+        self.written, self.carried = max(begin, end), carried
+        return begin
+
+    def is_late(self):
+        """Is the next step without a word too near, or played already?"""
+        return self.written < self.step + 2
+
+    def is_unread(self, first, read, now):
+        """Was a step's word not read yet, and are the groups in step with each other and with the clock?
+
+        ``read`` are the places in the ring that they read next. A step's word is read while it is played. The clock is
+        right within a step, and ``now`` may be later than the reading, because memory was collected in between.
+        """
+        played, _ = self.walk(now)
+        for place in read:
+            step = self.step + (place - self.step) % RING
+            if step > min(first, played + 2):
+                return False
+        return played < first
+
+
 # controller -----------------------------------------------------------------------------------------------------------
 # Answers lines, and watches what is played.
 
@@ -386,6 +544,7 @@ class Controller:
         self.hardware = hardware
         self.unit = unit
         self.reset = reset
+        self.pace = Pace(hardware.pace)
         self.tables = [Table(group, link) for group, link in enumerate(hardware.links)]
         self.reader = LineReader()
         self.keep_ms = 1000
@@ -421,14 +580,28 @@ class Controller:
                 self._fail("silent")
 
     def _watch_run(self, silent, starved):
-        end = self.start + self.cycles * self.cycle_ticks
-        if self.cycles and end <= min(self.now, silent):
+        pace = self.pace
+        pace.advance(min(self.now, silent))
+        if pace.is_over():
             self._darken("idle")
             self.cycle, self.step = self.cycles, 0
-        elif starved and not (self.cycles and self.now > end - MIN_DARK):
+        elif starved and pace.walk(self.now + MIN_DARK)[0] != pace.last:
             self._fail("late")
         elif self.cycles > TURNS and not self.end_is_set:
-            self._set_end((self.now - self.start) // self.cycle_ticks)
+            self._set_end(pace.position()[0])
+        if self.state == "running" and pace.written is not None:
+            self._keep_pace()
+
+    def _keep_pace(self):
+        """Give the steps of a trimmed run their words, in time, and see that the groups read them in step."""
+        pace = self.pace
+        if pace.is_late():
+            self._fail("late")
+            return
+        first = pace.write()
+        read = self.hardware.read_places()
+        if not pace.is_unread(first, read, self.hardware.ticks()):
+            self._fail("late")
 
     def _set_end(self, played):
         """Tell the tables where the run ends, once the DMA has passed that place for the last time but one."""
@@ -444,13 +617,8 @@ class Controller:
         """Where the run is: by time, which has the same crystal as the state machines."""
         if self.state != "running" or self.now < self.start:
             return
-        self.cycle, left = divmod(self.now - self.start, self.cycle_ticks)
-        self.step = 0
-        for step in self.steps:
-            left -= self.slots[step][0] + self.slots[step][1]
-            if left < 0:
-                break
-            self.step += 1
+        self.pace.advance(self.now)
+        self.cycle, self.step = self.pace.position()
 
     def _darken(self, state):
         self.hardware.darken()
@@ -478,13 +646,15 @@ class Controller:
         fewest, most, states, keys = COMMANDS[name]
         if self.state not in states:
             raise RefusedError("fault", self.fault) if self.state == "fault" else RefusedError("state", self.state)
+        if name == "TRIM" and self.pace.step < self.pace.since:
+            raise RefusedError("state", "the trim before does not count yet")
         if "" in words or not fewest <= len(words) <= most:
             raise RefusedError("words", f"words: {len(words)}")
         values = getattr(self, "_answer_" + name.lower())(*words)
         return " ".join(["OK"] + [f"{key}={values[place]}" for place, key in enumerate(keys.split())])
 
     def _answer_id(self):
-        return 1, "rp2040", "pico-1.0", self.unit
+        return 1, "rp2040", "pico-1.1", self.unit
 
     def _answer_caps(self):
         limits = (MIN_ON, MIN_OFF, MIN_DARK, MAX_FLASH, MAX_FLASH, MAX_LINE_PPM, MAX_TOTAL_PPM)
@@ -536,11 +706,13 @@ class Controller:
         check = check_of(cycle)
         if check != claimed:
             raise RefusedError("check", f"check {claimed}, expected {check}")
-        self.cycle_ticks = check_cycle(cycle)
+        self.cycle_ticks, self.lit = check_cycle(cycle)
         if self.hardware.interlock_open():
             raise RefusedError("interlock", "interlock open")
+        self.shortest_dark = min([dark for _, dark, _, _ in cycle])
+        ending = self.pace.lay_out([duration + dark for duration, dark, _, _ in cycle], self.shortest_dark)
         for table in self.tables:
-            table.lay_out(self.slots, self.steps)
+            table.lay_out(self.slots, self.steps, ending)
         self.state = "armed"
         return check, self.cycle_ticks
 
@@ -550,16 +722,31 @@ class Controller:
         self.end_is_set = False
         for table in self.tables:
             table.wind(self.cycles)
+        self.pace.wind(self.cycles)
         self.start = self.hardware.start([table.lead_address for table in self.tables])
+        self.pace.begin(self.start)
         self.state = "running"
         return (self.start,)
 
     def _answer_trim(self, way, word):
         if way not in ("later", "sooner"):
             raise RefusedError("number", f"way {way[:20]}")
-        if number(word):
-            raise RefusedError("range", "this board's DMA plays by itself and takes no trim")
-        return way, word
+        ppm = number(word)
+        if ppm > MAX_TRIM_PPM:
+            raise RefusedError("range", f"ppm {ppm} > max_trim_ppm {MAX_TRIM_PPM}")
+        self._trim(ppm if way == "later" else -ppm)
+        return way, ppm
+
+    def _trim(self, ppm):
+        pace = self.pace
+        check_trim(ppm, self.cycle_ticks, self.lit, len(self.steps), self.shortest_dark)
+        since = pace.counts_from(self.now)
+        if since < pace.walk(self.hardware.ticks())[0] + 2:
+            raise RefusedError("state", "too busy to trim in time, ask again")
+        pace.trim(ppm, since)
+        self._keep_pace()
+        if self.state == "fault":
+            raise RefusedError("fault", self.fault)
 
     def _answer_stop(self):
         self._darken("fault" if self.state == "fault" else "idle")
@@ -601,6 +788,7 @@ PINS_LOW = 0xA003  # mov pins, null
 STALLED = 3 << 24
 DMA, DMA_ABORT = 0x50000000, 0x50000444
 UNPACED = 0x3F
+CHANNELS = 4  # for each group
 
 
 def reset_cause(chip, reason, scratch):
@@ -628,17 +816,18 @@ def play():
 
 
 class Link:
-    """What one group's table has to know of the hardware."""
+    """What one group's table has to know of the hardware. Its channels: data, control, turn, pace."""
 
     def __init__(self, group, channels, memory, turns):
         self.fifo = PIO_FIFO + 4 * group
         self.treq = group
-        self.data, self.control, self.turn = channels[:3]
+        self.data, self.control, self.turn, self.pace = channels[:CHANNELS]
         self.memory, self.turns = memory, turns
+        self.ending = memory[2] + 4  # the wait of the table's first entry
 
 
 class Pico:
-    """The board: time, interlock, and a state machine with three DMA channels for each group of lines."""
+    """The board: time, interlock, and a state machine with four DMA channels for each group of lines."""
 
     def __init__(self):
         machine.freq(1000000 * TICKS_PER_US)
@@ -653,10 +842,13 @@ class Pico:
             fifo_join=rp2.PIO.JOIN_TX,
         )(play)
         self.machines = [rp2.StateMachine(group) for group in range(GROUPS)]
-        self.claimed = [rp2.DMA() for _ in range(3 * GROUPS)]
+        self.claimed = [rp2.DMA() for _ in range(CHANNELS * GROUPS)]
         numbers = [claim.channel for claim in self.claimed]
+        words, first, address = self._memory((GROUPS + 1) * TURNS, 4 * TURNS)  # rings that the DMA reads
+        rings = [(words, first + TURNS * place, address + 4 * TURNS * place) for place in range(GROUPS + 1)]
+        self.pace = rings[GROUPS]
         self.links = [
-            Link(group, numbers[3 * group :], self._memory(TABLE_WORDS, 64), self._memory(TURNS, 4 * TURNS))
+            Link(group, numbers[CHANNELS * group :], self._memory(TABLE_WORDS, 64), rings[group])
             for group in range(GROUPS)
         ]
         self._load()
@@ -690,6 +882,10 @@ class Pico:
         """Has a state machine run out of words since the start?"""
         return bool(machine.mem32[PIO_FDEBUG] & STALLED)
 
+    def read_places(self):
+        """Which place of the pace's ring each group reads next."""
+        return [(machine.mem32[DMA + 64 * link.pace] >> 2) % RING for link in self.links]
+
     def _set_channel(self, channel, read, write, count, control):
         for place, word in ((0, read), (4, write), (8, count), (16, control)):  # 16: CTRL without a trigger
             machine.mem32[DMA + 64 * channel + place] = word
@@ -701,6 +897,8 @@ class Pico:
             lead = lead_addresses[group]
             ring = control_word(UNPACED, link.turn, 0, 12)
             self._set_channel(link.turn, link.turns[2], DMA + 64 * link.control + 0x3C, 1, ring)
+            ring = control_word(UNPACED, link.control, 0, 12)
+            self._set_channel(link.pace, self.pace[2], link.ending, 1, ring)
             ring = control_word(UNPACED, link.control, 1, 4, 1)
             self._set_channel(link.control, lead, DMA + 64 * link.data, 4, ring)
             machine.mem32[DMA + 64 * link.control + 0x3C] = lead  # and go
@@ -720,7 +918,7 @@ class Pico:
         machine.mem32[PIO] = 0
         for group in range(GROUPS):
             machine.mem32[PIO_INSTRUCTION + PIO_NEXT_INSTRUCTION * group] = PINS_LOW
-        channels = [number for link in self.links for number in (link.turn, link.control, link.data)]
+        channels = [number for link in self.links for number in (link.pace, link.turn, link.control, link.data)]
         for channel in channels:  # a channel that is enabled may be triggered again by one that is aborted
             machine.mem32[DMA + 64 * channel + 16] = 0
         machine.mem32[DMA_ABORT] = sum([1 << channel for channel in channels])

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PARTS = ("link", "lines", "flashes", "table", "controller", "board")
+PARTS = ("link", "lines", "flashes", "table", "pace", "controller", "board")
 HEADER = '''"""Strobe controller for a Raspberry Pi Pico (RP2040) in MicroPython: copy this file onto the board.
 
 Made by make_main.py from the files in parts/: change those. README.md beside this file says how it works.

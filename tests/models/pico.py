@@ -2,11 +2,13 @@
 
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from rp2040 import Chip, board_of, load_program
 
 from psvideo.strobe.limits import cycle_check
+from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.link.requests import Arm, Lit, Slot, Steps
 from psvideo.strobe.stand_ins.playing import Edge
@@ -27,6 +29,7 @@ class Pico:
     """The program on a chip, under the same handle as PythonBoard."""
 
     def __init__(self, reset: str = "power") -> None:
+        self.board = BOARDS["rp2040"]
         self.chip = Chip()
         self.controller = PROGRAM.Controller(board_of(PROGRAM, self.chip), "emulated", reset)
 
@@ -49,6 +52,12 @@ class Pico:
         answer: bytes = self.controller.feed(data)
         return answer
 
+    def take_edges(self) -> list[Edge]:
+        """Return the edges since this was last called, and forget them."""
+        taken = self.edges
+        self.chip.edges.clear()
+        return taken
+
     @property
     def edges(self) -> list[Edge]:
         """All edges so far."""
@@ -70,9 +79,22 @@ def random_slot(dice: random.Random, place: int) -> Slot:
     )
 
 
-def upload(dice: random.Random) -> list[str]:
-    """Return requests that upload and arm some cycle."""
+def upload(dice: random.Random, *, darker: int = 0) -> list[str]:
+    """Return requests that upload and arm some cycle, whose dark times are longer by some ticks."""
     slots = [random_slot(dice, place) for place in range(dice.randint(1, 6))]
+    slots = [replace(slot, dark=slot.dark + darker) for slot in slots]
     steps = [dice.randrange(len(slots)) for _ in range(dice.randint(1, 12))]
     requests = [*slots, Steps(first=0, slots=tuple(steps)), Arm(check=cycle_check([slots[step] for step in steps]))]
     return [format_request(request, sealed=False).decode().strip() for request in requests]
+
+
+def in_order(edges: list[Edge]) -> list[Edge]:
+    """Return edges by time and line; edges of a line that are in the same tick stay as they are."""
+    return sorted(edges, key=lambda edge: (edge.tick, edge.line))
+
+
+def same_answer(pico: bytes, python: bytes) -> bool:
+    """Compare replies, of refusals the code only."""
+    if python.startswith(b"E "):
+        return pico.split()[:2] == python.split()[:2]
+    return pico == python.replace(b"python-1", b"pico-1.1")

@@ -61,7 +61,7 @@ class StrobedLoop:
     camera_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.program = make_program(self.plan, capabilities(self.board.board, "gated"))
+        self.program = make_program(self.plan, capabilities(self.board.board, self.board.board.first_wiring))
         self.rng = np.random.default_rng(self.seed)
         for request in (*self.program.upload(), Run(cycles=0)):
             self.ask(request)

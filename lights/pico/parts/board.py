@@ -16,6 +16,7 @@ import uctypes
 
 from controller import Controller
 from link import LINES, START_DELAY, TICKS_PER_US
+from pace import RING
 from table import GROUP_LINES, GROUPS, TABLE_WORDS, TURNS, control_word
 
 FIRST_PIN, INTERLOCK_PIN, SERVICE_PIN = 2, 10, 11
@@ -29,6 +30,7 @@ PINS_LOW = 0xA003  # mov pins, null
 STALLED = 3 << 24
 DMA, DMA_ABORT = 0x50000000, 0x50000444
 UNPACED = 0x3F
+CHANNELS = 4  # for each group
 
 
 def reset_cause(chip, reason, scratch):
@@ -56,17 +58,18 @@ def play():
 
 
 class Link:
-    """What one group's table has to know of the hardware."""
+    """What one group's table has to know of the hardware. Its channels: data, control, turn, pace."""
 
     def __init__(self, group, channels, memory, turns):
         self.fifo = PIO_FIFO + 4 * group
         self.treq = group
-        self.data, self.control, self.turn = channels[:3]
+        self.data, self.control, self.turn, self.pace = channels[:CHANNELS]
         self.memory, self.turns = memory, turns
+        self.ending = memory[2] + 4  # the wait of the table's first entry
 
 
 class Pico:
-    """The board: time, interlock, and a state machine with three DMA channels for each group of lines."""
+    """The board: time, interlock, and a state machine with four DMA channels for each group of lines."""
 
     def __init__(self):
         machine.freq(1000000 * TICKS_PER_US)
@@ -81,10 +84,13 @@ class Pico:
             fifo_join=rp2.PIO.JOIN_TX,
         )(play)
         self.machines = [rp2.StateMachine(group) for group in range(GROUPS)]
-        self.claimed = [rp2.DMA() for _ in range(3 * GROUPS)]
+        self.claimed = [rp2.DMA() for _ in range(CHANNELS * GROUPS)]
         numbers = [claim.channel for claim in self.claimed]
+        words, first, address = self._memory((GROUPS + 1) * TURNS, 4 * TURNS)  # rings that the DMA reads
+        rings = [(words, first + TURNS * place, address + 4 * TURNS * place) for place in range(GROUPS + 1)]
+        self.pace = rings[GROUPS]
         self.links = [
-            Link(group, numbers[3 * group :], self._memory(TABLE_WORDS, 64), self._memory(TURNS, 4 * TURNS))
+            Link(group, numbers[CHANNELS * group :], self._memory(TABLE_WORDS, 64), rings[group])
             for group in range(GROUPS)
         ]
         self._load()
@@ -118,6 +124,10 @@ class Pico:
         """Has a state machine run out of words since the start?"""
         return bool(machine.mem32[PIO_FDEBUG] & STALLED)
 
+    def read_places(self):
+        """Which place of the pace's ring each group reads next."""
+        return [(machine.mem32[DMA + 64 * link.pace] >> 2) % RING for link in self.links]
+
     def _set_channel(self, channel, read, write, count, control):
         for place, word in ((0, read), (4, write), (8, count), (16, control)):  # 16: CTRL without a trigger
             machine.mem32[DMA + 64 * channel + place] = word
@@ -129,6 +139,8 @@ class Pico:
             lead = lead_addresses[group]
             ring = control_word(UNPACED, link.turn, 0, 12)
             self._set_channel(link.turn, link.turns[2], DMA + 64 * link.control + 0x3C, 1, ring)
+            ring = control_word(UNPACED, link.control, 0, 12)
+            self._set_channel(link.pace, self.pace[2], link.ending, 1, ring)
             ring = control_word(UNPACED, link.control, 1, 4, 1)
             self._set_channel(link.control, lead, DMA + 64 * link.data, 4, ring)
             machine.mem32[DMA + 64 * link.control + 0x3C] = lead  # and go
@@ -148,7 +160,7 @@ class Pico:
         machine.mem32[PIO] = 0
         for group in range(GROUPS):
             machine.mem32[PIO_INSTRUCTION + PIO_NEXT_INSTRUCTION * group] = PINS_LOW
-        channels = [number for link in self.links for number in (link.turn, link.control, link.data)]
+        channels = [number for link in self.links for number in (link.pace, link.turn, link.control, link.data)]
         for channel in channels:  # a channel that is enabled may be triggered again by one that is aborted
             machine.mem32[DMA + 64 * channel + 16] = 0
         machine.mem32[DMA_ABORT] = sum([1 << channel for channel in channels])

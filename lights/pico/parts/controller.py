@@ -1,6 +1,6 @@
 """Answers lines, and watches what is played."""
 
-from flashes import check_cycle, check_of, check_slot
+from flashes import check_cycle, check_of, check_slot, check_trim
 from lines import LineReader, lit_word, number, seal, unseal
 from link import (
     COMMANDS,
@@ -11,6 +11,7 @@ from link import (
     MAX_FLASH,
     MAX_LINE_PPM,
     MAX_TOTAL_PPM,
+    MAX_TRIM_PPM,
     MIN_DARK,
     MIN_OFF,
     MIN_ON,
@@ -19,6 +20,7 @@ from link import (
     TICKS_PER_MS,
     RefusedError,
 )
+from pace import Pace
 from table import TURNS, Table
 
 
@@ -29,6 +31,7 @@ class Controller:
         self.hardware = hardware
         self.unit = unit
         self.reset = reset
+        self.pace = Pace(hardware.pace)
         self.tables = [Table(group, link) for group, link in enumerate(hardware.links)]
         self.reader = LineReader()
         self.keep_ms = 1000
@@ -64,14 +67,28 @@ class Controller:
                 self._fail("silent")
 
     def _watch_run(self, silent, starved):
-        end = self.start + self.cycles * self.cycle_ticks
-        if self.cycles and end <= min(self.now, silent):
+        pace = self.pace
+        pace.advance(min(self.now, silent))
+        if pace.is_over():
             self._darken("idle")
             self.cycle, self.step = self.cycles, 0
-        elif starved and not (self.cycles and self.now > end - MIN_DARK):
+        elif starved and pace.walk(self.now + MIN_DARK)[0] != pace.last:
             self._fail("late")
         elif self.cycles > TURNS and not self.end_is_set:
-            self._set_end((self.now - self.start) // self.cycle_ticks)
+            self._set_end(pace.position()[0])
+        if self.state == "running" and pace.written is not None:
+            self._keep_pace()
+
+    def _keep_pace(self):
+        """Give the steps of a trimmed run their words, in time, and see that the groups read them in step."""
+        pace = self.pace
+        if pace.is_late():
+            self._fail("late")
+            return
+        first = pace.write()
+        read = self.hardware.read_places()
+        if not pace.is_unread(first, read, self.hardware.ticks()):
+            self._fail("late")
 
     def _set_end(self, played):
         """Tell the tables where the run ends, once the DMA has passed that place for the last time but one."""
@@ -87,13 +104,8 @@ class Controller:
         """Where the run is: by time, which has the same crystal as the state machines."""
         if self.state != "running" or self.now < self.start:
             return
-        self.cycle, left = divmod(self.now - self.start, self.cycle_ticks)
-        self.step = 0
-        for step in self.steps:
-            left -= self.slots[step][0] + self.slots[step][1]
-            if left < 0:
-                break
-            self.step += 1
+        self.pace.advance(self.now)
+        self.cycle, self.step = self.pace.position()
 
     def _darken(self, state):
         self.hardware.darken()
@@ -121,13 +133,15 @@ class Controller:
         fewest, most, states, keys = COMMANDS[name]
         if self.state not in states:
             raise RefusedError("fault", self.fault) if self.state == "fault" else RefusedError("state", self.state)
+        if name == "TRIM" and self.pace.step < self.pace.since:
+            raise RefusedError("state", "the trim before does not count yet")
         if "" in words or not fewest <= len(words) <= most:
             raise RefusedError("words", f"words: {len(words)}")
         values = getattr(self, "_answer_" + name.lower())(*words)
         return " ".join(["OK"] + [f"{key}={values[place]}" for place, key in enumerate(keys.split())])
 
     def _answer_id(self):
-        return 1, "rp2040", "pico-1.0", self.unit
+        return 1, "rp2040", "pico-1.1", self.unit
 
     def _answer_caps(self):
         limits = (MIN_ON, MIN_OFF, MIN_DARK, MAX_FLASH, MAX_FLASH, MAX_LINE_PPM, MAX_TOTAL_PPM)
@@ -179,11 +193,13 @@ class Controller:
         check = check_of(cycle)
         if check != claimed:
             raise RefusedError("check", f"check {claimed}, expected {check}")
-        self.cycle_ticks = check_cycle(cycle)
+        self.cycle_ticks, self.lit = check_cycle(cycle)
         if self.hardware.interlock_open():
             raise RefusedError("interlock", "interlock open")
+        self.shortest_dark = min([dark for _, dark, _, _ in cycle])
+        ending = self.pace.lay_out([duration + dark for duration, dark, _, _ in cycle], self.shortest_dark)
         for table in self.tables:
-            table.lay_out(self.slots, self.steps)
+            table.lay_out(self.slots, self.steps, ending)
         self.state = "armed"
         return check, self.cycle_ticks
 
@@ -193,16 +209,31 @@ class Controller:
         self.end_is_set = False
         for table in self.tables:
             table.wind(self.cycles)
+        self.pace.wind(self.cycles)
         self.start = self.hardware.start([table.lead_address for table in self.tables])
+        self.pace.begin(self.start)
         self.state = "running"
         return (self.start,)
 
     def _answer_trim(self, way, word):
         if way not in ("later", "sooner"):
             raise RefusedError("number", f"way {way[:20]}")
-        if number(word):
-            raise RefusedError("range", "this board's DMA plays by itself and takes no trim")
-        return way, word
+        ppm = number(word)
+        if ppm > MAX_TRIM_PPM:
+            raise RefusedError("range", f"ppm {ppm} > max_trim_ppm {MAX_TRIM_PPM}")
+        self._trim(ppm if way == "later" else -ppm)
+        return way, ppm
+
+    def _trim(self, ppm):
+        pace = self.pace
+        check_trim(ppm, self.cycle_ticks, self.lit, len(self.steps), self.shortest_dark)
+        since = pace.counts_from(self.now)
+        if since < pace.walk(self.hardware.ticks())[0] + 2:
+            raise RefusedError("state", "too busy to trim in time, ask again")
+        pace.trim(ppm, since)
+        self._keep_pace()
+        if self.state == "fault":
+            raise RefusedError("fault", self.fault)
 
     def _answer_stop(self):
         self._darken("fault" if self.state == "fault" else "idle")

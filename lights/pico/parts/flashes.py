@@ -59,18 +59,30 @@ def lit_ticks(slot):
 
 
 def check_cycle(slots):
-    """Refuse a cycle that is lit too much or lasts too long; returns its length."""
+    """Refuse a cycle that is lit too much or lasts too long; returns its length, and for how long lines are on."""
     cycle = sum([slot[0] + slot[1] for slot in slots])
     each = [lit_ticks(slot) for slot in slots]
-    lines = [sum([ticks[line] for ticks in each]) for line in range(LINES)]
-    for line, ticks in enumerate(lines):
+    lit = [sum([ticks[line] for ticks in each]) for line in range(LINES)]
+    _check_shares(cycle, lit)
+    return cycle, lit
+
+
+def _check_shares(cycle, lit):
+    for line, ticks in enumerate(lit):
         if ticks * 1000000 // cycle > MAX_LINE_PPM:
             raise RefusedError("limit", f"line {line} {ticks * 1000000 // cycle} ppm > max_line_ppm {MAX_LINE_PPM}")
-    if sum(lines) * 1000000 // cycle > MAX_TOTAL_PPM:
-        raise RefusedError("limit", f"total {sum(lines) * 1000000 // cycle} ppm > max_total_ppm {MAX_TOTAL_PPM}")
+    if sum(lit) * 1000000 // cycle > MAX_TOTAL_PPM:
+        raise RefusedError("limit", f"total {sum(lit) * 1000000 // cycle} ppm > max_total_ppm {MAX_TOTAL_PPM}")
     if cycle > MAX_CYCLE:
         raise RefusedError("limit", f"cycle {cycle} > {MAX_CYCLE}")
-    return cycle
+
+
+def check_trim(ppm, cycle, lit, steps, shortest_dark):
+    """Refuse to have a cycle's steps last longer by so many ppm, or shorter below 0; ``lit`` is check_cycle's."""
+    if shortest_dark + cycle * ppm // (1000000 * steps) < 2 * MIN_DARK:
+        raise RefusedError("limit", f"dark < 2 min_dark {2 * MIN_DARK}")
+    ticks = cycle * abs(ppm) // 1000000 + 1
+    _check_shares(cycle - ticks if ppm < 0 else cycle + ticks, lit)
 
 
 def check_of(slots):

@@ -11,7 +11,9 @@ GROUPS, GROUP_LINES = 2, 4  # two state machines in step, four lines each
 STATES = 8  # an entry is a word of eight states, a tick each, and a word that says how much longer the last one lasts
 SHORTEST = 10  # ticks of an entry: eight states, the delay's fetch, one pass of its loop
 STEADY = 0x11111111  # times a state: that state eight times
-TABLE_WORDS = 3300  # the longest table: 32 slots of bursts and 240 steps
+SPARE_DARK = 20 * SHORTEST  # ticks of a dark time that stay on either side of where it is parted
+TAIL_ENTRIES = 5  # or more: a FIFO and the register behind it hold nine words, so no tail is read ahead as a whole
+TABLE_WORDS = 4000  # the longest table: 32 slots of bursts and 240 steps
 TURNS = 1024  # whole cycles that the DMA counts by itself
 
 
@@ -63,8 +65,18 @@ def padded(made):
     return made
 
 
-def parts(slot, group):
-    """What a group of lines does in a flash: how many bursts, one burst, and the last burst with the dark time."""
+def long_enough(made):
+    """The same with TAIL_ENTRIES or more, by parting the last wait, in which it is dark."""
+    word, wait = made[-1]
+    more = max(TAIL_ENTRIES - len(made), 0)
+    return made[:-1] + [(word, wait - SHORTEST * more)] + [(0, 0)] * more
+
+
+def parts(slot, group, ending):
+    """What a group of lines does in a flash: how many bursts, one burst, and its tail.
+
+    That is the last burst with the dark time, but for its last ticks (``ending``).
+    """
     duration, dark, period, lit = slot
     on = [(1 << line % GROUP_LINES, ticks) for line, ticks in lit if line // GROUP_LINES == group]
     if not [ticks for _, ticks in on if ticks < period]:
@@ -73,7 +85,8 @@ def parts(slot, group):
     bursts = (duration - 1) // period
     last = duration - bursts * period
     burst = padded(entries(on, period)) if bursts else []
-    return bursts, burst, entries([(bit, min(ticks, last)) for bit, ticks in on], last + dark)
+    tail = entries([(bit, min(ticks, last)) for bit, ticks in on], last + dark - ending)
+    return bursts, burst, long_enough(tail)
 
 
 def control_word(treq, chain_to, inc_write=0, ring_bits=0, ring_write=0):
@@ -85,11 +98,12 @@ def control_word(treq, chain_to, inc_write=0, ring_bits=0, ring_write=0):
 class Table:
     """One group's cycle in memory: entries, and the control blocks by which the DMA walks through them for ever.
 
-    ``turns`` are what the DMA reads behind every cycle: the address of the next one's blocks, or 0 to stop.
+    ``turns`` are what the DMA reads behind every cycle: the address of the next one's blocks, or 0 to stop. The table's
+    first entry is the dark time's ending of every step: the DMA puts its wait there, a step's word of the ring (pace).
     """
 
     def __init__(self, group, link):
-        """``link`` has fifo, treq (of the state machine), control, turn (channels), memory and turns (aligned)."""
+        """``link`` has fifo, treq (of the state machine), control, turn, pace (channels), memory, turns (aligned)."""
         self.group = group
         self.link = link
         self.used = 0
@@ -111,14 +125,18 @@ class Table:
     def _put_block(self, address, count, chain_to, ring_bits=0):
         return self._put(address, self.link.fifo, count, control_word(self.link.treq, chain_to, 0, ring_bits))
 
-    def lay_out(self, slots, steps):
-        """Write the cycle; slots' entries are there once, however often the steps name them."""
+    def lay_out(self, slots, steps, ending):
+        """Write the cycle; slots' entries are there once, however often the steps name them.
+
+        ``ending`` is how many ticks of every dark time are not the tail's.
+        """
         self.used = 0
+        dark, _ = self._put_entries([(0, 0)])
         lead = self._put_entries([(0, START_DELAY - SHORTEST)])
         placed = {}
         for step in steps:
             if step not in placed:
-                bursts, burst, tail = parts(slots[step], self.group)
+                bursts, burst, tail = parts(slots[step], self.group, ending)
                 ring = self._put_entries(burst, 2 * len(burst)) if bursts else (0, 0)
                 placed[step] = (bursts, ring, self._put_entries(tail))
         self.lead_address = self._put_block(lead[0], lead[1], self.link.control)
@@ -128,7 +146,8 @@ class Table:
             if bursts:
                 bits = [1 << bit for bit in range(8)].index(4 * ring[1])
                 self._put_block(ring[0], bursts * ring[1], self.link.control, bits)
-            self._put_block(tail[0], tail[1], self.link.turn if place + 1 == len(steps) else self.link.control)
+            self._put_block(tail[0], tail[1], self.link.pace)
+            self._put_block(dark, 2, self.link.turn if place + 1 == len(steps) else self.link.control)
 
     def wind(self, cycles):
         """Have it play for ever, or that many cycles if they are not more than TURNS."""

@@ -112,18 +112,18 @@ def cycle_refusal(steps: Sequence[Slot], caps: Capabilities, *, longer: int = 0)
     return None
 
 
-def trim_share(steps: Sequence[Slot], ppm: int) -> tuple[int, int]:
-    """Return by how many ticks a trim makes each step longer, and how many millionths of the steps' number are left.
+def least_longer(steps: Sequence[Slot], ppm: int) -> int:
+    """Return by how many ticks a trim makes each step longer at least; some are by one more.
 
-    >>> trim_share([Slot(slot=0, duration=1600, dark=15_080, period=1600)], -100)
-    (-2, 332000)
+    >>> least_longer([Slot(slot=0, duration=1600, dark=15_080, period=1600)], -100)
+    -2
     """
-    return divmod(cycle_ticks(steps) * ppm, PPM * len(steps))
+    return cycle_ticks(steps) * ppm // (PPM * len(steps))
 
 
 def trim_refusal(steps: Sequence[Slot], caps: Capabilities, ppm: int) -> Refusal | None:
     """Return why a controller does not make a cycle's steps longer (or shorter, below 0) by this many ppm."""
-    if min(slot.dark for slot in steps) + trim_share(steps, ppm)[0] < 2 * caps.min_dark:
+    if min(slot.dark for slot in steps) + least_longer(steps, ppm) < 2 * caps.min_dark:
         return _refuse(Error.LIMIT, f"dark < 2 min_dark {2 * caps.min_dark}")
     ticks = cycle_ticks(steps) * abs(ppm) // PPM + 1
     return cycle_refusal(steps, caps, longer=-ticks if ppm < 0 else ticks)

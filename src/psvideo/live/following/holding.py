@@ -9,8 +9,13 @@ from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.link.lines import Error
 from psvideo.strobe.link.requests import Trim
 
-STEPS_UNTIL = 1.5
-"""A trim takes effect from the step after the next one: this many steps later, on average."""
+
+def counts_after_s(step_s: float, lead_s: float) -> float:
+    """Return how long after it was asked for a trim counts, on average.
+
+    It counts from the first step that begins ``lead_s`` later or more, behind the next one.
+    """
+    return max(step_s, lead_s) + 0.5 * step_s
 
 
 def trim_by(ppm: int) -> Trim:
@@ -22,6 +27,7 @@ def trim_by(ppm: int) -> Trim:
 class Holding:
     """Holds the dark row of a chain's strobe at a target. ``ask`` sends a trim to the board.
 
+    ``lead_s`` is the board's: a trim counts no sooner than this after it was asked for.
     ``ppm`` is the trim that the board has, ``most_ppm`` the largest that it may ever have had, either way;
     ``short_rows`` by how much the dark row was off its target when it was last looked at, None while nothing is
     followed; ``note`` says why the board refused, where it did, ``ended`` that it plays no more.
@@ -30,6 +36,7 @@ class Holding:
     chain: Chain
     target: WantedRow
     ask: Callable[[Trim], object]
+    lead_s: float = 0.0
     ppm: int = 0
     most_ppm: int = 0
     short_rows: float | None = None
@@ -46,7 +53,7 @@ class Holding:
         with self.chain.at_rest():
             wanted = self._wanted_ppm(host_s)
             step_s = self.chain.plan.cycle_s / len(self.chain.plan.cycle_slots)
-            counts_s = self.chain.camera_s(host_s) + STEPS_UNTIL * step_s
+            counts_s = self.chain.camera_s(host_s) + counts_after_s(step_s, self.lead_s)
         if (wanted == self.ppm and not self._unsure) or not self._trimmed(
             wanted
         ):  # frames do not wait for the board's answer

@@ -14,7 +14,7 @@ from psvideo.live.following.holding import Holding
 from psvideo.runs.steps.caller import Caller
 from psvideo.runs.strobe.port import opened_port
 from psvideo.runs.strobe.run import warn_of_flashing
-from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.link.boards import BOARDS, FIRMWARE_WITHOUT_TRIMS
 from psvideo.strobe.link.exchange import Link
 from psvideo.strobe.link.ports import EMULATED
 from psvideo.strobe.link.replies import Trimmed
@@ -52,9 +52,10 @@ def held_strobe(
     with opened_port(port) as opened:
         link = Link(opened)
         ready = prepare(link)
-        _check_trims(ready.identity.board, opened.name)
+        _check_trims(ready.identity.firmware, opened.name)
         program = make_program(plan, ready.caps, source=str(plan_path))
-        holding = Holding(chain=chain, target=target, ask=lambda trim: link.ask(trim, Trimmed))
+        lead_s = 1e-3 * BOARDS[ready.identity.board].trim_lead_ms if ready.identity.board in BOARDS else 0.0
+        holding = Holding(chain=chain, target=target, ask=lambda trim: link.ask(trim, Trimmed), lead_s=lead_s)
         over = threading.Event()
 
         def ended(outcome: Outcome) -> None:
@@ -69,13 +70,13 @@ def held_strobe(
             player.join()
 
 
-def _check_trims(board: str, port: str) -> None:
-    """Raise UsageError where a board takes no trims, before it flashes."""
-    if board in BOARDS and not BOARDS[board].trims:
-        able = ", ".join(name for name, one in BOARDS.items() if one.trims)
+def _check_trims(firmware: str, port: str) -> None:
+    """Raise UsageError where a board's program takes no trims, before it flashes."""
+    if firmware in FIRMWARE_WITHOUT_TRIMS:
         raise UsageError(
-            f"{port}: `lock` trims the strobe's period while it runs, and this board, an {board}, takes no trims: it "
-            f"plays by itself. Use one that does ({able}), or leave `lock` out and play the plan by psvideo strobe run."
+            f"{port}: `lock` trims the strobe's period while it runs, and the board's program, {firmware}, takes no "
+            "trims yet. Copy the newer lights/pico/main.py onto the Pico (lights/pico/README.md), or leave `lock` out "
+            "and play the plan by psvideo strobe run."
         )
 
 

@@ -15,13 +15,15 @@ MAX_TRIM_PPM = 20_000
 KEEP_MS = (100, 2000)
 KEEP_AFTER_RESET_MS = 1000
 """Limits that every controller enforces."""
+FIRMWARE_WITHOUT_TRIMS = ("pico-1.0",)
+"""What boards answer to ID whose program refuses every trim: the Pico's before it took them."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Board:
     """One kind of board: its tick, what it holds, and for each wiring how many lines and how many powers a flash.
 
-    ``trims``: its steps can be made longer or shorter while it runs.
+    ``trim_lead_ms``: a trim counts this long after it was asked for, or later.
     """
 
     name: str
@@ -33,7 +35,7 @@ class Board:
     min_on_us: int
     min_off_us: int
     tolerance_ppm: int
-    trims: bool
+    trim_lead_ms: int
 
     @property
     def first_wiring(self) -> WiringName:
@@ -62,7 +64,7 @@ BOARDS: Mapping[str, Board] = {
             min_on_us=20,
             min_off_us=20,
             tolerance_ppm=5000,
-            trims=True,
+            trim_lead_ms=0,
         ),
         Board(
             name="atmega2560",
@@ -74,7 +76,7 @@ BOARDS: Mapping[str, Board] = {
             min_on_us=20,
             min_off_us=20,
             tolerance_ppm=5000,
-            trims=True,
+            trim_lead_ms=0,
         ),
         Board(
             name="rp2040",
@@ -86,7 +88,7 @@ BOARDS: Mapping[str, Board] = {
             min_on_us=1,
             min_off_us=1,
             tolerance_ppm=100,
-            trims=False,
+            trim_lead_ms=20,
         ),
     )
 }

@@ -2,9 +2,10 @@
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import accumulate
 
-from psvideo.strobe.limits import PPM, trim_share
+from psvideo.strobe.limits import PPM
 from psvideo.strobe.link.requests import Slot
 
 
@@ -29,26 +30,47 @@ class Moment:
 
 @dataclass(kw_only=True)
 class Trimming:
-    """How much longer than uploaded every step of a run is, in whole ticks; a share of a tick is carried on.
+    """When the steps of a run begin, and how much longer than uploaded they are, in whole ticks.
 
-    ``ppm`` holds from the step ``since`` on, counted from the run's start, and ``before`` until then.
+    ``ppm`` holds from the step ``since`` on, counted from the run's start, and ``before`` until then. A share of a tick
+    is carried on from step to step.
     """
 
     steps: Sequence[Slot]
+    start: int = 0
     ppm: int = 0
     before: int = 0
     since: int = 0
-    _carried: int = 0
+    _parts_since: int = 0
+    _offsets: list[int] = field(init=False)
 
-    def trim(self, ppm: int, *, step: int) -> None:
-        """Make the steps behind the next one longer by this many ppm, while ``step`` is played."""
-        self.before, self.ppm, self.since = self.ppm, ppm, step + 2
+    def __post_init__(self) -> None:
+        self._offsets = list(accumulate((slot.duration + slot.dark for slot in self.steps), initial=0))
+
+    def trim(self, ppm: int, *, step: int, not_before: int) -> None:
+        """Make the steps behind the next one that begin at a tick or later longer by this many ppm, in ``step``."""
+        since = step + 2
+        while self.begin(since) < not_before:
+            since += 1
+        self._parts_since = self._parts(since)
+        self.before, self.ppm, self.since = self.ppm, ppm, since
+
+    def begin(self, step: int) -> int:
+        """Return the tick in which a step begins that is not before the one in which it was trimmed last."""
+        cycles, place = divmod(step, len(self.steps))
+        return self.start + cycles * self._offsets[-1] + self._offsets[place] + self._late(step)
 
     def extra(self, step: int) -> int:
-        """Return by how many ticks a step is longer; to be asked once of each."""
-        whole, rest = trim_share(self.steps, self.ppm if step >= self.since else self.before)
-        more, self._carried = divmod(self._carried + rest, PPM * len(self.steps))
-        return whole + more
+        """Return by how many ticks a step is longer than uploaded."""
+        return self._late(step + 1) - self._late(step)
+
+    def _late(self, step: int) -> int:
+        return self._parts(step) // (PPM * len(self.steps))
+
+    def _parts(self, step: int) -> int:
+        """Return by how many of a tick's parts, a step's number times a million, all steps before one are longer."""
+        ppm = self.ppm if step >= self.since else self.before
+        return self._parts_since + self._offsets[-1] * ppm * (step - self.since)
 
 
 def moments(

@@ -157,11 +157,12 @@ class PythonBoard:
             self._darken()
         if isinstance(request, Run):
             steps = self._memory.sequence or ()
-            self._trimming = Trimming(steps=steps)
+            self._trimming = Trimming(steps=steps, start=start)
             self._moments = moments(steps, start=start, cycles=request.cycles, extra=self._trimming.extra)
             self._next = next(self._moments)
         if isinstance(request, Trim) and isinstance(reply, Reply):
-            self._trimming.trim(signed_ppm(request), step=self._played)
+            not_before = self._now + self._ticks(self.board.trim_lead_ms)
+            self._trimming.trim(signed_ppm(request), step=self._played, not_before=not_before)
         if isinstance(reply, Reply):
             self._heard = self._now
         return reply

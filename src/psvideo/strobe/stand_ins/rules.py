@@ -161,8 +161,6 @@ def _arm(memory: ControllerMemory, request: requests.Arm) -> Answer:
 def _trim(memory: ControllerMemory, request: requests.Trim) -> replies.Reply | replies.Refusal:
     if request.ppm > MAX_TRIM_PPM:
         return _refuse(Error.RANGE, f"ppm {request.ppm} > max_trim_ppm {MAX_TRIM_PPM}")
-    if request.ppm and not memory.board.trims:
-        return _refuse(Error.RANGE, f"ppm {request.ppm}, this board plays by itself and takes no trim")
     refusal = trim_refusal(memory.sequence or (), memory.caps, signed_ppm(request))
     return refusal or replies.Trimmed(way=request.way, ppm=request.ppm)
 
