@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -17,13 +16,13 @@ from psvideo.cli.app import main
 from psvideo.cli.options.per_light import parse_weights
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
-from psvideo.export.preview_movie import even, write_movie, write_movies
+from psvideo.export.preview_movie import even, write_movie
 from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.programs.loading_notes import loading_note
 from psvideo.export.programs.nuke_script import nuke_script
 from psvideo.export.programs.otio import Footage, Images, timeline_text
 from psvideo.export.usd.usd_stage import StageView, stage_text
-from psvideo.model.choices import CODECS, Program
+from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
@@ -207,22 +206,6 @@ def test_a_movie_shows_the_colours_that_it_was_given(codec: str, suffix: str, pi
     with pytest.raises(PsvideoError, match="no picture"):
         write_movie(path, [], fps=Fraction(24))
     assert [p.name for p in tmp_path.iterdir()] == [path.name], "a movie that fails leaves the one before"
-
-
-def test_movies_that_are_written_together_have_the_bytes_of_each_alone(tmp_path: Path) -> None:
-    rng, paths = np.random.default_rng(2), {codec: tmp_path / f"together.{codec}" for codec in CODECS["both"]}
-    pictures, made = [rng.integers(0, 255, (64, 96, 3), dtype=np.uint8) for _ in range(3)], list[int]()
-
-    def shown() -> Iterator[np.ndarray]:
-        for number, picture in enumerate(pictures):
-            made.append(number)
-            yield picture
-
-    write_movies(paths, shown(), fps=Fraction(24))
-    assert made == [0, 1, 2], "every picture is made once"
-    for codec, path in paths.items():
-        write_movie(tmp_path / "alone", pictures, fps=Fraction(24), codec=codec)
-        assert path.read_bytes() == (tmp_path / "alone").read_bytes()
 
 
 def test_a_movie_of_an_odd_width_has_the_same_bytes_whatever_else_runs(tmp_path: Path) -> None:

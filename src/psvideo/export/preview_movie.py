@@ -5,8 +5,7 @@ needs an encoder under the GPL. Pictures are sRGB; the stream says so: primaries
 video range (ITU-T H.273). Encoders run with a fixed number of threads, so that the same pictures give the same bytes.
 """
 
-import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -54,58 +53,27 @@ def write_movie(path: Path, pictures: Iterable[Pixels], *, fps: Fraction, codec:
 
     Raises PsvideoError where the movie cannot be written.
     """
-    write_movies({codec: path}, pictures, fps=fps)
+    coding = CODINGS[codec]
+    with whole_file(path) as beside:
+        try:
+            with av.open(str(beside), "w", format=coding.container, options=CONTAINING) as container:
+                stream: VideoStream | None = None
+                for picture in pictures:
+                    stream = stream or _stream(container, coding, picture, fps)
+                    container.mux(stream.encode(_frame(picture, coding)))
+                if stream is None:
+                    raise PsvideoError(f"{path}: there is no picture to make a movie of.")
+                container.mux(stream.encode(None))
+        except av.FFmpegError as fault:
+            raise PsvideoError(f"{path}: the movie cannot be written ({fault}). Make room, then run again.") from fault
 
 
-def write_movies(paths: Mapping[Codec, Path], pictures: Iterable[Pixels], *, fps: Fraction) -> None:
-    """Write the same pictures as a movie for each codec, as ``write_movie`` does: each picture is made once."""
-    with contextlib.ExitStack() as movies:
-        adds = [movies.enter_context(_movie(path, fps, CODINGS[codec])) for codec, path in paths.items()]
-        for picture in pictures:
-            shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-            for add in adds:
-                add(shown)
-
-
-@contextlib.contextmanager
-def _movie(path: Path, fps: Fraction, coding: _Coding) -> Iterator[Callable[[av.VideoFrame], None]]:
-    """Give what adds a picture to one movie."""
-    stream: VideoStream | None = None
-    with (
-        whole_file(path) as beside,
-        _named(path),
-        av.open(str(beside), "w", format=coding.container, options=CONTAINING) as container,
-    ):
-
-        def add(shown: av.VideoFrame) -> None:
-            nonlocal stream
-            with _named(path):
-                stream = stream or _stream(container, coding, shown, fps)
-                container.mux(stream.encode(_coded(shown, coding)))
-
-        yield add
-        if stream is None:
-            raise PsvideoError(f"{path}: there is no picture to make a movie of.")
-        container.mux(stream.encode(None))
-
-
-@contextlib.contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Say of which movie it is that FFmpeg fails."""
-    try:
-        yield
-    except av.FFmpegError as fault:
-        raise PsvideoError(f"{path}: the movie cannot be written ({fault}). Make room, then run again.") from fault
-
-
-def _stream(
-    container: av.container.OutputContainer, coding: _Coding, shown: av.VideoFrame, fps: Fraction
-) -> VideoStream:
+def _stream(container: av.container.OutputContainer, coding: _Coding, picture: Pixels, fps: Fraction) -> VideoStream:
     rate = fps.limit_denominator(MOST_RATE)
     stream = cast(VideoStream, container.add_stream(coding.encoder, rate=rate, options=coding.options))
     stream.thread_type = "AUTO"
     stream.codec_context.thread_count = ENCODING_THREADS
-    stream.height, stream.width = shown.height, shown.width
+    stream.height, stream.width = picture.shape[:2]
     stream.pix_fmt = coding.pixels
     context = stream.codec_context
     context.color_primaries, context.color_trc = ColorPrimaries.BT709, ColorTrc.IEC61966_2_1
@@ -113,8 +81,9 @@ def _stream(
     return stream
 
 
-def _coded(shown: av.VideoFrame, coding: _Coding) -> av.VideoFrame:
-    coded = shown.reformat(
+def _frame(picture: Pixels, coding: _Coding) -> av.VideoFrame:
+    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+    coded = frame.reformat(
         format=coding.pixels,
         src_color_range=ColorRange.JPEG,
         dst_color_range=ColorRange.MPEG,

@@ -75,10 +75,10 @@ def write_previews(
             )
             for number in numbers
         ]
-        named = {each: preview_name(run.clip.name, preview, MOVIE_SUFFIXES[each]) for each in CODECS[codec]}
-        paths = {each: path for each, name in named.items() if not (path := run.folder / name).is_file()}
-        if instants and paths:
-            write_preview(paths, preview, instants, fps=run.fps, watch=watch)
+        for each in CODECS[codec]:
+            path = run.folder / preview_name(run.clip.name, preview, MOVIE_SUFFIXES[each])
+            if instants and not path.is_file():
+                write_preview(path, preview, instants, fps=run.fps, codec=each, watch=watch)
     shutil.rmtree(run.folder / KEPT, ignore_errors=True)
 
 

@@ -47,17 +47,16 @@ def preview_name(clip: str, preview: Preview, suffix: str) -> str:
 
 
 def write_preview(
-    paths: Mapping[Codec, Path], preview: Preview, instants: Sequence[PreviewedInstant], *, fps: Fraction, watch: Watch
+    path: Path, preview: Preview, instants: Sequence[PreviewedInstant], *, fps: Fraction, codec: Codec, watch: Watch
 ) -> None:
-    """Write movies of the instants, one for each codec, in the order of their numbers; a number that is not there holds
-    the one before.
+    """Write one movie of the instants, in the order of their numbers; a number that is not there holds the one before.
 
     How bright pictures are shown is set by the first instant, for the whole movie. A lone instant is relit for one
     turn of the light.
     """
     from psvideo.export.preview_movie import (  # FFmpeg's libraries take memory: only where a movie is made
         even,
-        write_movies,
+        write_movie,
     )
 
     exposure = _exposure(preview, instants[0])
@@ -74,7 +73,7 @@ def write_preview(
             for _ in range(one.number, after):
                 yield shown
 
-    write_movies(paths, pictures(), fps=fps)
+    write_movie(path, pictures(), fps=fps, codec=codec)
 
 
 def _exposure(preview: Preview, first: PreviewedInstant) -> float:
