@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.by_colour import spread_across_and_along
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 
 AVERAGED = 5
@@ -77,7 +78,7 @@ def by_slope_deg(
     shown = np.zeros(known.shape, np.float32)
     if unseen:
         typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs, lit)))
-        shown = typical_deg * _turned_beside_stretched(points, lit, bright)
+        shown = typical_deg * _turned_beside_stretched(points, lit, known, bright)
     if alike_unseen:
         shown = np.maximum(shown, np.float32(alike_unseen) * _turned_by_added_deg(points, lit, pairs))
     shown = np.sqrt(np.maximum(shown**2 - (np.float32(OF_NOISE) * points.noise_deg) ** 2, 0))
@@ -255,11 +256,8 @@ def _of_place(place: Doubles) -> Doubles:
     return np.stack([row, col, row * row, row * col, col * col], axis=-1)
 
 
-def _turned_beside_stretched(points: ThinSurface, lit: Illumination, bright: Mask) -> Floats:
+def _turned_beside_stretched(points: ThinSurface, lit: Illumination, known: Mask, bright: Mask) -> Floats:
     """Return how many times more than along a normal, typically where all lamps shine, lights spread across every
     normal what each is off by, (row, col), where all are off by the same share of their strengths."""
-    inverse = np.linalg.pinv(lit.directions)
-    spread = (inverse @ inverse.T).astype(np.float32)
-    along = np.einsum("irc,ij,jrc->rc", points.planes, spread, points.planes)
-    across = np.maximum(np.float32(np.trace(spread)) - along, np.float32(0))
+    across, along = spread_across_and_along(points, lit, known)
     return np.asarray(np.sqrt(across / median(along[bright])), np.float32)

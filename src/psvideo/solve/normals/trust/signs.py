@@ -4,7 +4,8 @@ These signs are looked for on a coarse grid, and around every pixel, since they 
 lights leave unexplained says how far the model is from the surface. Light that shows where a lamp does not reach came
 by way of other surfaces, which light everything alike and leave no residual. And normals that belong to no surface are
 wrong whatever the lights say of them (``torn.py``). Where lights can hardly be held against each other, albedo that
-goes with the slope shows what turns normals (``by_slope.py``).
+goes with the slope shows what turns normals (``by_slope.py``), and albedo that pales what is mirrored
+(``by_colour.py``).
 """
 
 import math
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
@@ -65,7 +67,8 @@ class Signs:
     of themselves torn normals count whatever else shows, under lights that can hardly be held against each other.
     ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals under four and five
     lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
-    shows it, under lights that can hardly be held against each other (``by_slope.py``)."""
+    shows it, under lights that can hardly be held against each other (``by_slope.py``); ``by_colour_deg`` as its
+    colour does (``by_colour.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -81,6 +84,7 @@ class Signs:
     by_model_deg: Floats | float = 0.0
     torn_share: Floats | float = 0.0
     by_slope_deg: Floats | float = 0.0
+    by_colour_deg: Floats | float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
@@ -92,7 +96,7 @@ class Signs:
 
 def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None, *, by_slope: bool = True) -> Signs:
     """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
-    misfit of rig or surface; without ``by_slope`` nobody looks at albedo that goes with the slope. Raises ValueError
+    misfit of rig or surface; without ``by_slope`` nobody looks at what albedo shows. Raises ValueError
     where nobody looked for light from around."""
     if one.indirect is None:
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
@@ -131,6 +135,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, alike_unseen=alike)
         if unseen or alike
         else 0.0,
+        by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
     )
 
 
