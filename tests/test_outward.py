@@ -147,3 +147,11 @@ def test_a_bowl_is_not_called_wrong_and_a_guessed_order_is_what_is_blamed() -> N
     assert hollow.grade == "doubtful"
     assert "hollow" in hollow.found
     assert "order of the lights is a guess" in guessed.found
+
+
+def test_a_bowl_under_a_guessed_order_that_is_right_is_doubted_and_not_called_wrong() -> None:
+    """With every other first light the line stayed, and it said that the order was hardly the true one."""
+    ways = ring(4, 30)
+    line = said_of(bowl(), ways, ways, guessed=True)
+    assert line.grade == "doubtful"
+    assert "or the subject is hollow" in line.found

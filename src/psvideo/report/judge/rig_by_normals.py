@@ -117,14 +117,17 @@ def facing_inwards(observed: Observed, *, guessed: bool) -> Judgement | None:
     if facing is None or facing >= OUTWARD or not quiet(observed.facts):
         return None
     inwards = "Normals do not face outwards where the subject ends, as those of a body that stands free do"
+    hollow = facing < INSIDE_OUT
     if guessed:
         return Judgement(
             subject="rig",
-            grade="doubtful" if facing > HARDLY else "bad",
-            found=f"{inwards}: the order of the lights is a guess, and hardly the true one.",
-            advice="Try the other lights as `first_light`, one after the other: with the right one this line is gone.",
+            grade="doubtful" if hollow or facing > HARDLY else "bad",
+            found=f"{inwards}: the order of the lights is a guess, and hardly the true one"
+            + (", or the subject is hollow, as a bowl is." if hollow else "."),
+            advice="Try the other lights as `first_light`, one after the other: with the right one this line is gone"
+            + (", or nothing is wrong where it is hollow." if hollow else "."),
         )
-    if facing < INSIDE_OUT:
+    if hollow:
         return Judgement(
             subject="rig",
             grade="doubtful",
