@@ -10,6 +10,7 @@ import pytest
 
 from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.plan import Plan
+from psvideo.model.srgb import srgb_share
 from psvideo.model.swing import Swing
 from psvideo.model.timing import Timing
 from psvideo.sync import frames_taken
@@ -293,6 +294,48 @@ def test_lamps_that_flicker_are_not_taken_for_a_camera_whose_gain_changes(
     assert 0.1 < timing.swing.share < 0.4
 
 
+@pytest.mark.parametrize(
+    ("read", "least", "most"),
+    [
+        (lambda light: srgb_share(np.maximum(light, 0).astype(np.float32)), 0.65, 0.85),
+        (lambda light: np.maximum(light, 1e-6) ** 0.45, 0.65, 0.85),  # near what Rec. 709 makes of it
+        (lambda light: np.log10(1 + 30 * np.maximum(light, 0)) / 1.5, 0.6, 0.9),
+        (lambda light: np.maximum(light, 0) ** 2.2, 0.1, 0.35),  # light that was read as a signal
+    ],
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_light_that_was_read_by_another_curve_shows_where_a_row_splits_a_flash(
+    plan: Plan, read: Callable[[np.ndarray], np.ndarray], least: float, most: float, seed: int
+) -> None:
+    timing = timing_of(plan, read(in_columns(plan, seed)).mean(axis=2))
+    assert timing.half is not None
+    assert least < timing.half.share < most
+    assert timing.half.sentence in timing.notes
+    assert not any("LEDs" in note or "exposure is" in note for note in timing.notes), "which the curve looks like"
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("options", [{}, {"rise_s": 1e-4, "fall_s": 2e-4}, {"ambient": 0.1}, {"ppm": 400.0}])
+def test_light_that_was_read_rightly_adds_up_under_slow_leds_and_room_light_too(
+    plan: Plan, options: dict[str, float], seed: int
+) -> None:
+    assert timing_of(plan, in_columns(plan, seed, **options).mean(axis=2)).half is None
+
+
+def in_columns(
+    plan: Plan, seed: int, *, ppm: float = 30.0, ambient: float = 0.0, rise_s: float = 0.0, fall_s: float = 0.0
+) -> np.ndarray:
+    """Return the light (frame, row, column) of a textured scene beside a dark wall."""
+    rng = np.random.default_rng(seed)
+    wall = np.repeat([1.0, 0.02], COLUMNS // 2)
+    plates = {slot: (0.1 + 0.6 * rng.random((ROWS, COLUMNS))) * wall for slot in plan.lit_slots}
+    clock = TrueClock(phase_s=0.0123 + 0.001 * seed, offset_ppm=ppm)
+    if rise_s:
+        plan = replace(plan, rise_s=rise_s, fall_s=fall_s)
+    shot = expose(plates, plan, frames=FRAMES, clock=clock, noise=NOISE, bits=12)
+    return np.asarray(shot.frames + ambient, np.float64)
+
+
 @pytest.mark.parametrize("widths", [0.3, 0.45])
 def test_a_lit_ball_that_leaves_the_picture_is_not_taken_for_lamps_that_flicker(
     make_plan: PlanMaker, widths: float
@@ -358,8 +401,9 @@ def test_edges_are_not_called_soft_while_the_camera_s_gain_swings(plan: Plan, mo
     """Between two frames of other gains an edge is bent: LEDs of no rise time were said to take 51 us."""
     asked = list[tuple[Any, Any]]()
 
-    def kept(_: Plan, found: Any, *, swing: Any) -> tuple[str, ...]:
+    def kept(_: Plan, found: Any, *, swing: Any, half: Any) -> tuple[str, ...]:
         asked.append((found, swing))
+        assert half is None
         return ()
 
     monkeypatch.setattr(frames_taken, "remarks", kept)

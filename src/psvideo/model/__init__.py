@@ -2,7 +2,8 @@
 
 - the shoot: ``camera``, ``plan``, ``marker`` (how a cycle's flashes differ in time), ``maximal_length`` (codes of dark
   slots), ``first_light`` (the one that a user names), ``timing`` (when every flash fired), ``swing`` (light that
-  grows and shrinks), ``camera_clocks`` (several cameras), ``rig`` (where the lights are)
+  grows and shrinks), ``half_flash`` (how bright half of one looks), ``camera_clocks`` (several
+  cameras), ``rig`` (where the lights are)
 - pictures: ``arrays`` (short names of array types), ``coded`` (in the codes of their files), ``channels`` (mean,
   brightest), ``turn`` (which way is up), ``srgb`` (its curve)
 - the result: ``surface``, ``quantities`` (the table of all that is written and shown)

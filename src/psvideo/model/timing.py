@@ -9,6 +9,7 @@ import numpy as np
 
 from psvideo.model.arrays import Doubles
 from psvideo.model.camera import Camera
+from psvideo.model.half_flash import HalfFlash
 from psvideo.model.plan import HasLights, Plan
 from psvideo.model.rows.ripple import Ripple
 from psvideo.model.rows.shutter import Pulse
@@ -70,6 +71,8 @@ class Timing:
     swing
         How the clip's light grows and shrinks, None where it does not or that was not looked at. Not in the file, like
         what follows.
+    half
+        How bright half of a flash looks, None where that is half of all of it or was not looked at.
     notes
         Sentences on what to distrust.
     row_time_error_s
@@ -93,6 +96,7 @@ class Timing:
     fall_s: float = 0.0
     mains: Ripple | None = None
     swing: Swing | None = field(default=None, compare=False)
+    half: HalfFlash | None = field(default=None, compare=False)
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
     phase_error_s: float | None = field(default=None, compare=False)

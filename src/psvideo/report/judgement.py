@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Grade = Literal["good", "doubtful", "bad", "unknown"]
-DECISIVE = ("strobe", "timing", "order", "rig")
+DECISIVE = ("strobe", "curve", "timing", "order", "rig")
 """Where one of these is doubtful, all normals may be wrong, and not only parts of them."""
 
 

@@ -150,7 +150,8 @@ def judged_take(
             later = tuple(number for number in later if number > take.numbers[-1])
             lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
             judged = clip.curve_doubt
-            notes = tuple(note for note in timing.notes if timing.swing is None or note != timing.swing.sentence)
+            said = {one.sentence for one in (timing.swing, timing.half) if one}
+            notes = tuple(note for note in timing.notes if note not in said)
     return Check(
         clip=clip.name,
         path=path,

@@ -16,6 +16,7 @@ from psvideo.sync.unfired import only_fired
 from psvideo.sync.unfired_words import remarks_on_unfired
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
+from psvideo.sync.verdict.split_flashes import half_flash
 from psvideo.sync.verdict.swinging import swing_of
 
 
@@ -59,15 +60,16 @@ def timing_of_take(take: FramesTaken, strobe: FoundStrobe, *, breaks: tuple[bool
     )
     marks = marks_of(plan, found, timing.flashes, take.indices, breaks)
     black, seen, unfired, fired = marks.black, marks.seen, marks.unfired, marks.fired
-    swing = swing_of(plan, only_fired(found, seen, unfired))
+    only = only_fired(found, seen, unfired)
+    swing, half = swing_of(plan, only), half_flash(plan, only)
     notes = (
-        *remarks(plan, found, swing=swing),
+        *remarks(plan, found, swing=swing, half=half),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
         *remarks_on_frames(plan, found, take.indices),
         *remarks_on_black(found, black, take.numbers),
         *remarks_on_unfired(found, seen, fired, take.numbers),
     )
-    return replace(timing, flashes=fired, swing=swing, notes=notes)
+    return replace(timing, flashes=fired, swing=swing, half=half, notes=notes)
 
 
 def _all_dropped(

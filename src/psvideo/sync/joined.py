@@ -81,6 +81,7 @@ def joined(
         mains=main.mains if main is timings[0] else None,
         dropped_frames=tuple(holes[after] for after in sorted(holes)),
         swing=max((one.swing for one in timings if one.swing), key=lambda swing: swing.share, default=None),
+        half=next((one.half for one in timings if one.half), None),
         repeated_frames=tuple(number for one in timings for number in one.repeated_frames),
         notes=(
             *_restarts(chapters),

@@ -10,7 +10,7 @@ from psvideo.report.judge.of_motion import motion
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
 from psvideo.report.judge.of_steadiness import focus, steadiness
-from psvideo.report.judge.of_timing import timing_and_order
+from psvideo.report.judge.of_timing import read_otherwise, timing_and_order
 from psvideo.report.judge.of_validity import first_of_all, validity
 from psvideo.report.judge.of_what_moves import what_moves
 from psvideo.report.judgement import Judgement
@@ -40,6 +40,7 @@ def judgements(
     lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt))
     return (
         *on_time,
+        *([read_otherwise(timing.half)] if timing.half else []),
         *coverage(plan, timing, observed, take_s=take_s),
         *exposed,
         *([levels] if levels else []),
@@ -55,7 +56,7 @@ def judgements(
         *lit,
         *accuracy(observed),
         *distance(observed),
-        *validity(observed, first=first_of_all((*exposed, *lit), curve_doubted=bool(curve_doubt))),
+        *validity(observed, first=first_of_all((*exposed, *lit), curve_doubted=bool(curve_doubt or timing.half))),
         *what_moves(observed.facts, aligned=aligned),
         *steadiness(observed.facts),
     )

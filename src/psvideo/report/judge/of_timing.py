@@ -1,7 +1,8 @@
-"""Judgements on the flashes: how certain their times are, and which light is which."""
+"""Judgements on the flashes: how certain their times are, which light is which, and whether their light adds up."""
 
 from collections.abc import Iterator
 
+from psvideo.model.half_flash import HalfFlash
 from psvideo.model.timing import Timing
 from psvideo.report.judgement import Judgement
 
@@ -47,6 +48,12 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
         )
     else:
         yield Judgement(subject="order", grade="good", found=ORDER[timing.order])
+
+
+def read_otherwise(half: HalfFlash) -> Judgement:
+    """Judge that light was read by another curve than it was coded with: halves of flashes do not look half as bright,
+    and every normal is made of parts of its light."""
+    return Judgement(subject="curve", grade="bad", found=half.found, advice=half.advice)
 
 
 ORDER = {

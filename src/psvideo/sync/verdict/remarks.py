@@ -9,6 +9,7 @@ import numpy as np
 from psvideo.model.camera import Camera
 from psvideo.model.cost.in_step import IN_STEP, never_shown
 from psvideo.model.cost.shoot_figures import mixed_share
+from psvideo.model.half_flash import HalfFlash
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.swing import Swing
@@ -37,16 +38,22 @@ MUCH = 0.5
 """Share of the times' error from which on its source is worth a word."""
 
 
-def remarks(plan: Plan, found: ClipFit, *, swing: Swing | None) -> tuple[str, ...]:
+def remarks(
+    plan: Plan, found: ClipFit, *, swing: Swing | None, half: HalfFlash | None = None
+) -> tuple[str, ...]:  # fmt: skip
     """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given;
-    ``swing`` is how its light grows and shrinks."""
+    ``swing`` is how its light grows and shrinks, ``half`` how bright half of a flash looks where that shows another
+    curve, which also looks like slow LEDs or another exposure."""
     beat = found.fit.beat
     said = [
         _clock(plan, found),
         _mixed(plan, beat),
-        *_camera(plan, found),
+        *(_camera(plan, found) if half is None else ()),
+        "" if half is None else half.sentence,
         "" if swing is None else swing.sentence,
-        _soft(found) if swing is None else "",  # light that changes between two frames bends edges as well
+        _soft(found)
+        if swing is None and half is None
+        else "",  # light that changes between two frames bends edges as well
         _unsteady(found),
         _sureness(plan, found),
     ]

@@ -1,0 +1,91 @@
+"""Whether light adds up where a row splits a flash between two frames: it does not where it was read by another curve.
+
+At 360 degrees a row's openings follow each other without a gap. So what two frames saw of one flash is all of it,
+however slowly its LED glows and wherever in it the row closed. Light that was read as its power g gives parts a and b
+of which a^(1/g) + b^(1/g) is 1; no exposure that a frame holds makes a + b more, and a shorter one makes it less by as
+much for all parts.
+"""
+
+import numpy as np
+
+from psvideo.compute.ranks import median, quantile
+from psvideo.model.arrays import Doubles, Integers
+from psvideo.model.half_flash import HalfFlash
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.profiles import compiled_flashes
+
+WHOLE_SHUTTER, NEARLY = 0.98, 0.999
+"""Shares of the frame that is exposed, and of the exposure that flashes must be apart, for parts to add up."""
+MOST_FLASHES = 400
+LEAST_LIGHT, STEADY = 0.15, 0.04
+"""Rows count that a light gives this share of the brightest row's, and that change by less than this share."""
+PART = (0.05, 0.97)
+"""Parts that are smaller or larger say little of the curve."""
+LEAST_PARTS = 20
+STRAIGHT = (0.8, 1.25)
+"""Powers between which curves are taken for the plan's: right ones give 0.99 to 1.01 where the subject stands, and 0.89
+to 1.12 under LED tails and mains ripple; rec709, sRGB and S-Log3 that are read as others 0.52 to 0.56."""
+CLEARER = 0.6
+"""Of what one sum for all parts leaves over, a power leaves at most this share where it is one."""
+POWERS = np.geomspace(0.05, 8.0, 200)
+
+
+def half_flash(plan: Plan, found: ClipFit) -> HalfFlash | None:
+    """Return how bright half of a flash looks; None where that is half of all of it, or where the clip does not show
+    it: below 360 degrees, without a dark slot, where rows hold two flashes, or where too little stands still."""
+    beat = found.fit.beat
+    exposure_s = plan.camera.exposure_s  # another one may have been found for the curve's sake
+    exposed = exposure_s >= WHOLE_SHUTTER * plan.camera.frame_period_s
+    if not (exposed and plan.dark_s * beat.clock.rate >= NEARLY * exposure_s and beat.row_time_s > 0.0):
+        return None
+    parts = _parts(plan, found)
+    if len(parts) < LEAST_PARTS:
+        return None
+    raised = (parts[:, :, None] ** (1 / POWERS)).sum(axis=1)
+    powers = POWERS[np.abs(raised - 1).argmin(axis=1)]
+    power, sums = median(powers), parts.sum(axis=1)
+    bent = quantile(powers, 0.9) < STRAIGHT[0] or quantile(powers, 0.1) > STRAIGHT[1]
+    left = median(np.abs((parts ** (1 / power)).sum(axis=1) - 1))
+    if not bent or left > CLEARER * median(np.abs(sums - median(sums))):
+        return None
+    return HalfFlash(share=float(0.5**power))
+
+
+def _parts(plan: Plan, found: ClipFit) -> Doubles:
+    """Return what two frames in a row saw of flashes that they split, (part, 2), as shares of all of it."""
+    rows, beat = found.rows, found.fit.beat
+    flashes = compiled_flashes(plan, rows, beat)
+    some = np.unique(np.linspace(0, len(flashes.start_s) - 1, MOST_FLASHES).astype(np.int64))
+    start_s, lasts_s, light = flashes.start_s[some, None], flashes.duration_s[some, None], flashes.unknown[some]
+    opens_s = rows.place * beat.row_time_s
+    first = np.floor((start_s - lasts_s / 2 - opens_s) / rows.period_s).astype(np.int64)  # that is open just before it
+    ends_s = (first + 1) * rows.period_s + opens_s - start_s  # after the flash's start, (flash, row)
+    split = ends_s < 1.5 * lasts_s
+    whole = (ends_s > 2 * lasts_s) & (ends_s - rows.period_s < -lasts_s)
+    seen, after = _at(found, first), _at(found, first + 1)
+    kinds = range(flashes.unknowns)
+    if len(np.unique(light)) < len(kinds):
+        return np.zeros((0, 2))  # without a dark slot room light is not known
+    every = [_middle(np.where(whole[light == one], seen[light == one], np.nan)) for one in kinds]
+    dark, all_of_it = every[0], np.stack([one - every[0] for one in every])
+    strays = np.abs(seen - dark - all_of_it[light])
+    spread = np.stack([_middle(np.where(whole[light == one], strays[light == one], np.nan)) for one in kinds])
+    bright = np.nan_to_num(all_of_it)
+    steady = (bright > LEAST_LIGHT * bright.max()) & (spread < STEADY * bright)
+    counts = split & steady[light] & (light[:, None] > 0) & np.isfinite(seen + after)
+    parts = np.stack([(one - dark)[counts] / all_of_it[light][counts] for one in (seen, after)], axis=1)
+    return np.asarray(parts[(parts.min(axis=1) > PART[0]) & (parts.max(axis=1) < PART[1])])
+
+
+def _at(found: ClipFit, place: Integers) -> Doubles:
+    """Return what rows show in the frames at places in time (flash, row); NaN where there is none."""
+    rows = found.rows
+    at = np.minimum(np.searchsorted(rows.index, place), len(rows.index) - 1)
+    return np.where(rows.index[at] == place, rows.value[at, np.arange(rows.value.shape[1])], np.nan)
+
+
+def _middle(values: Doubles) -> Doubles:
+    """Return each column's median of what is no NaN, the lower one of two; NaN where nothing is."""
+    middle = np.maximum(np.isfinite(values).sum(axis=0) - 1, 0) // 2
+    return np.asarray(np.take_along_axis(np.sort(values, axis=0), middle[None], axis=0)[0])
