@@ -1,6 +1,8 @@
 """What repeats itself fits the next of its kind from round to round, but not from flash to flash."""
 
 import math
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -141,3 +143,26 @@ def test_folds_under_three_lights_are_not_followed_to_the_next_but_one(px: float
     ]
     found = followed_at(shown, 0.0)
     assert (np.hypot(*found.velocity) * ROUND_S > WAVE_PX / 2).mean() < 0.05
+
+
+@pytest.mark.parametrize(("threads", "most"), [("1", 1), ("2", 1), ("4", 2)])
+def test_flows_leave_the_threads_that_write_to_these(
+    threads: str, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    """Each holds as much as a plate, on top of what is being written."""
+    at_a_time, counts, lock = [0], list[int](), threading.Lock()
+
+    def counted(one: np.ndarray, *_: object) -> np.ndarray:
+        with lock:
+            at_a_time[0] += 1
+            counts.append(at_a_time[0])
+        time.sleep(0.02)
+        with lock:
+            at_a_time[0] -= 1
+        return np.zeros((*one.shape, 2), np.float32)
+
+    monkeypatch.setenv("PSVIDEO_THREADS", threads)
+    monkeypatch.setattr(all_lights, "flow_from", counted)
+    followed_at(pairs(lambda time_s: 9 * time_s / ROUND_S), 0.0)
+    assert len(counts) > 1
+    assert max(counts) <= most

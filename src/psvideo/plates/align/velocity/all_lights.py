@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from psvideo.compute.eight_lanes import EIGHT
-from psvideo.compute.threads import over_ranges
+from psvideo.compute.threads import WRITING_THREADS, over_ranges, thread_count
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.detail import FINEST_PX, detail_of, smoothed
@@ -139,7 +139,8 @@ class AllLights:
             arriving_rows(flow, share, np.float32(sign / round_s), 0, out.shape[1], out)
             return out
 
-        return over_ranges(run, len(ways), each=1)
+        beside = max(thread_count() - WRITING_THREADS, 1)  # the other threads write results meanwhile
+        return over_ranges(run, len(ways), each=1, threads=beside)
 
 
 def _spread(count: int, most: int) -> list[int]:
