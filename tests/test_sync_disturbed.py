@@ -194,6 +194,33 @@ def test_a_rise_and_a_fall_that_are_alike_are_found_though_no_flash_seems_longer
     assert [timing.rise_s, timing.fall_s] == pytest.approx([2e-5, 2e-5], rel=0.1)
 
 
+@pytest.mark.parametrize(("rise_s", "fall_s"), [(2e-5, 6e-5)])
+def test_tails_far_shorter_than_the_time_from_row_to_row_are_found(
+    rise_s: float, fall_s: float, make_plan: PlanMaker
+) -> None:
+    """A blur that reached only as far as these tails stood for them: all flashes were 25 us late, and 5 us claimed."""
+    plan = make_plan(height_px=48, width_px=COLUMNS, fps=Fraction(30))
+    assert max(rise_s, fall_s) < 0.1 * plan.camera.row_time_s
+    shot = shoot(replace(plan, rise_s=rise_s, fall_s=fall_s), frames=120)
+    timing = timing_of(plan, shot)
+    assert [timing.rise_s, timing.fall_s] == pytest.approx([rise_s, fall_s], rel=0.15)
+    assert rms_rows(timing, shot, plan) < 3 * timing.phase_error_rows < 0.02
+
+
+@pytest.mark.parametrize("share", [0.01, 0.03])
+def test_a_blur_between_rows_that_are_far_apart_in_time_is_not_taken_for_tails(
+    share: float, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(height_px=48, width_px=COLUMNS, fps=Fraction(30))
+    shot = shoot(plan, frames=120)
+    profiles = shot.frames.mean(axis=2, dtype=np.float64)
+    padded = np.pad(profiles, ((0, 0), (1, 1)), mode="edge")
+    blurred = (1 - 2 * share) * profiles + share * (padded[:, :-2] + padded[:, 2:])
+    timing = timing_from_rows(plan, np.arange(len(profiles)), blurred)
+    assert (timing.rise_s, timing.fall_s) == (0.0, 0.0)
+    assert rms_rows(timing, shot, plan) < 0.02
+
+
 def test_rows_that_are_blurred_are_not_taken_for_tails(plan: Plan) -> None:
     shot = shoot(plan)
     profiles = shot.frames.mean(axis=2, dtype=np.float64)

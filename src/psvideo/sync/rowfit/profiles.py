@@ -165,6 +165,7 @@ def compiled_flashes(plan: Plan, rows: Profiles, beat: Beat) -> row_model.Flashe
         beat.rise_s,
         beat.fall_s,
         beat.blur_s,
+        beat.row_time_s,
     )
 
 
@@ -270,7 +271,6 @@ def residuals_of(plan: Plan, timing: Timing, index: Integers, value: Doubles) ->
         int(unknown.max()) + 1,
         timing.rise_s,
         timing.fall_s,
-        0.0,
     )
     rest = np.empty(value.shape)
     kernel.rests(rows, flashes, np.ones(value.shape), 0, height, rest)

@@ -176,10 +176,9 @@ def edges(rows: Rows, flashes: Flashes, weight: Doubles, first: int, last: int, 
                     if u > 0:
                         light = right[u]
                         since_s, d = open_s - flashes.start_s[j], flashes.duration_s[j]
-                        _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s, flashes.blur_s)
-                        _, closing = given_off(
-                            since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s, flashes.blur_s
-                        )
+                        rise_s, fall_s, blur_s, row_s = flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
+                        _, opening = given_off(since_s, d, rise_s, fall_s, blur_s, row_s)
+                        _, closing = given_off(since_s + rows.exposure_s, d, rise_s, fall_s, blur_s, row_s)
                         pull[j, 0] += weight[n, row] * light * opening * rest
                         pull[j, 1] -= weight[n, row] * light * closing * rest
                         stiff[j, 0] += weight[n, row] * (light * opening) ** 2

@@ -24,8 +24,8 @@ GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall
 """The times, beside the clock's, that can be set free, and the signal of each."""
 EDGES = {"rise_s", "fall_s", "blur_s"}
 """Those that make edges soft: what they change is worked out only where one is free."""
-LEAST_BLUR_ROWS = 0.3
-"""A blur that is free stays this large, which is next to none: it changes what lies so near an edge, and no row may."""
+LEAST_BLUR_ROWS = 0.05
+"""A blur that is free stays this large, which is next to none: a row takes 0.1 % from either neighbour."""
 
 
 @dataclass(frozen=True, kw_only=True)

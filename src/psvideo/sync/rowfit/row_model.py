@@ -20,7 +20,9 @@ LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL, BLUR = range(7)
 """The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time, blur."""
 SIGNALS = 7
 SPREAD = 3.0**0.5
-"""Three points, at these standard deviations with weights 1, 4 and 1, blur as a Gaussian (Gauss-Hermite quadrature)."""
+"""Three points, at these standard deviations with weights 1, 4 and 1, blur as a Gaussian (Gauss-Hermite quadrature).
+No row takes light from nearer than the next one: where a blur is less than that, the outer points are there, and weigh
+less."""
 
 PARTS = 8
 PLACES = 2 * PARTS + 1
@@ -51,21 +53,34 @@ class Flashes(NamedTuple):
     duration_s: Doubles
     unknown: Integers
     unknowns: int
-    rise_s: float
-    fall_s: float
-    blur_s: float
-    """The standard deviation by which rows are blurred, as a time."""
+    rise_s: float = 0.0
+    fall_s: float = 0.0
+    blur_s: float = 0.0
+    """The standard deviation by which rows are blurred, as a time;"""
+    row_s: float = 0.0
+    """and the time from one row to the next."""
 
 
 @EXACT.kept
-def given_off(since_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float) -> tuple[float, float]:
+def reach_s(blur_s: float, row_s: float) -> float:
+    """Return how far a blur takes light from, 0 where there is none."""
+    return max(SPREAD * blur_s, row_s) if blur_s > 0.0 else 0.0
+
+
+@EXACT.kept
+def given_off(
+    since_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float, row_s: float
+) -> tuple[float, float]:
     """Return the share of its light that a flash has given off, and the rate at which it does so now."""
     share, rate = _sharp(since_s, duration_s, rise_s, fall_s)
     if blur_s <= 0.0:
         return share, rate
-    before, rate_before = _sharp(since_s - SPREAD * blur_s, duration_s, rise_s, fall_s)
-    after, rate_after = _sharp(since_s + SPREAD * blur_s, duration_s, rise_s, fall_s)
-    return (before + 4.0 * share + after) / 6.0, (rate_before + 4.0 * rate + rate_after) / 6.0
+    apart_s = reach_s(blur_s, row_s)
+    outer = 0.5 * (blur_s / apart_s) ** 2
+    before, rate_before = _sharp(since_s - apart_s, duration_s, rise_s, fall_s)
+    after, rate_after = _sharp(since_s + apart_s, duration_s, rise_s, fall_s)
+    inner = 1.0 - 2.0 * outer
+    return inner * share + outer * (before + after), inner * rate + outer * (rate_before + rate_after)
 
 
 @EXACT.kept
@@ -102,7 +117,7 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Doub
     design[0] = 1.0
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
     close_s = open_s + rows.exposure_s
-    near_s = SPREAD * flashes.blur_s
+    near_s = reach_s(flashes.blur_s, flashes.row_s)
     tail_s = REACH * flashes.fall_s + near_s
     over_s = OVER * flashes.fall_s + near_s
     while k < len(flashes.start_s) and flashes.start_s[k] + flashes.duration_s[k] + tail_s <= open_s:
@@ -117,8 +132,12 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Doub
             elif open_s <= start_s - near_s and close_s >= start_s + duration_s + over_s:
                 design[u] += 1.0
             else:
-                after, _ = given_off(close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s)
-                before, _ = given_off(open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s)
+                after, _ = given_off(
+                    close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
+                )
+                before, _ = given_off(
+                    open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
+                )
                 design[u] += after - before
         j += 1
     for b in range(len(rows.beat_hz)):
@@ -188,10 +207,12 @@ def _see_sharp(frame_start_s: Doubles, offset_s: float, exposure_s: float, flash
 
 
 @EXACT.called
-def _share(open_s: float, close_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float) -> float:
+def _share(
+    open_s: float, close_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float, row_s: float
+) -> float:
     """Return the share of a flash that is given off between two times since its start."""
-    after, _ = given_off(close_s, duration_s, rise_s, fall_s, blur_s)
-    before, _ = given_off(open_s, duration_s, rise_s, fall_s, blur_s)
+    after, _ = given_off(close_s, duration_s, rise_s, fall_s, blur_s, row_s)
+    before, _ = given_off(open_s, duration_s, rise_s, fall_s, blur_s, row_s)
     return after - before
 
 
@@ -201,11 +222,11 @@ def _add_tail_slopes(
     signals: Doubles,
 ) -> None:  # fmt: skip
     """Add how a flash's light changes with its tails: the difference to tails that are ``probe_s`` longer."""
-    rise_s, fall_s, blur_s = flashes.rise_s, flashes.fall_s, flashes.blur_s
-    signals[RISE] += light * (_share(open_s, close_s, d, rise_s + probe_s, fall_s, blur_s) - seen) / probe_s
-    signals[FALL] += light * (_share(open_s, close_s, d, rise_s, fall_s + probe_s, blur_s) - seen) / probe_s
+    rise_s, fall_s, blur_s, row_s = flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
+    signals[RISE] += light * (_share(open_s, close_s, d, rise_s + probe_s, fall_s, blur_s, row_s) - seen) / probe_s
+    signals[FALL] += light * (_share(open_s, close_s, d, rise_s, fall_s + probe_s, blur_s, row_s) - seen) / probe_s
     if blur_s > 0.0:
-        signals[BLUR] += light * (_share(open_s, close_s, d, rise_s, fall_s, blur_s + probe_s) - seen) / probe_s
+        signals[BLUR] += light * (_share(open_s, close_s, d, rise_s, fall_s, blur_s + probe_s, row_s) - seen) / probe_s
 
 
 @EXACT.kept
@@ -215,9 +236,9 @@ def slopes(
     """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
     close_s = open_s + rows.exposure_s
-    rise_s, fall_s, blur_s = flashes.rise_s, flashes.fall_s, flashes.blur_s
+    rise_s, fall_s, blur_s, row_s = flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
     probe_s = 0.01 * flashes.duration_s[0]
-    near_s = SPREAD * blur_s
+    near_s = reach_s(blur_s, row_s)
     tail_s = REACH * fall_s + near_s
     before_s = near_s + (SPREAD * probe_s if tails else 0.0)
     over_s = OVER * (fall_s + (probe_s if tails else 0.0)) + before_s
@@ -231,8 +252,8 @@ def slopes(
         since_close_s, since_open_s = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
         is_whole = since_open_s <= -before_s and since_close_s >= d + over_s  # however it is moved a little
         if u > 0 and not is_whole:
-            after, after_rate = given_off(since_close_s, d, rise_s, fall_s, blur_s)
-            before, before_rate = given_off(since_open_s, d, rise_s, fall_s, blur_s)
+            after, after_rate = given_off(since_close_s, d, rise_s, fall_s, blur_s, row_s)
+            before, before_rate = given_off(since_open_s, d, rise_s, fall_s, blur_s, row_s)
             closing += brightness[u] * after_rate
             opening += brightness[u] * before_rate
             if tails:
@@ -252,7 +273,7 @@ def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float
         return 0.0
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s - flashes.start_s[j]
     close_s = open_s + rows.exposure_s
-    return _share(open_s, close_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s)
+    return _share(open_s, close_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s)
 
 
 @EXACT.kept

@@ -120,9 +120,8 @@ def losses(plan: Plan, rows: Profiles, clocks: TriedClocks, start: Beat, *, plac
     end = int(np.ceil((last_s + 3 * rows.period_s - earliest_s) / plan.cycle_s)) + 1
     train = plan.train(begin * cycle, (end - begin) * cycle)
     unknown = slot_unknowns(plan)
-    flashes = row_model.Flashes(
-        train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, start.rise_s, start.fall_s, 0.0
-    )
+    square = row_model.Flashes(train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1)
+    flashes = square._replace(rise_s=start.rise_s, fall_s=start.fall_s)
     seen = compiled_rows(rows, start)._replace(row_place=place)
     phase_s, rate = clocks.phase_s, 1.0 + clocks.offset_ppm * 1e-6
     found = np.empty((len(phase_s), rows.value.shape[1]))

@@ -58,6 +58,7 @@ def losses_by_row(
             flashes.rise_s,
             flashes.fall_s,
             flashes.blur_s,
+            flashes.row_s,
         )
         for row in range(height):
             total, steep = 0.0, steepness / spread[row] ** 2

@@ -31,6 +31,8 @@ last), mostly below 1.8; tails through H.264 were 3.2 and more."""
 SOFTER, WORTH = (0.02, 0.06, 0.18), 1.0
 """Tails, as shares of the shortest flash, that are tried where rise and fall are alike: they leave the length of a
 flash as it is, so that small ones change nothing to the first order. Freeing them must take away so much at least."""
+FIRST_BLUR_ROWS = 0.3
+"""A blur is looked for from here: from far too large a one, rows that it spoils count as outliers, and it stays."""
 SOFT = 3.0
 """Edges are soft where tails take away this much of the robust loss,"""
 UNTOLD = 0.6
@@ -139,9 +141,11 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     row_time_s = fit.beat.row_time_s
     if row_time_s == 0.0:
         return Freed(fit=slow if _clear(fit, slow, tails) and gain > SLOWER else fit)
-    blurred = fitted(plan, rows, replace(fit.beat, blur_s=row_time_s), (*free, BLUR))
+    blurred = fitted(plan, rows, replace(fit.beat, blur_s=FIRST_BLUR_ROWS * row_time_s), (*free, BLUR))
     start = replace(slow.beat, blur_s=blurred.beat.blur_s)
     joint = fitted(plan, rows, start, (*free, *tails, BLUR))
+    if taken_away(plan, rows, blurred, joint) < 0.0:  # no step led from the tails to where a blur alone is better
+        joint = fitted(plan, rows, blurred.beat, (*free, *tails, BLUR))
     both = joint if _plausible(plan, joint.beat) and taken_away(plan, rows, slow, joint) >= -WORTH else slow
     apart_s = rms_apart_s(rows, slow.beat, both.beat)
     by_blur = max(taken_away(plan, rows, fit, blurred), 0.0)
