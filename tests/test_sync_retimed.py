@@ -16,15 +16,14 @@ from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.coarse import seed as seed_module
 from psvideo.sync.rowfit.coarse.retime import regular_step, twins
-from psvideo.sync.rowfit.coarse.seed import find_seed, first_guess, other_seeds
+from psvideo.sync.rowfit.coarse.seed import find_seed, other_seeds
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import memory_frames
-from psvideo.sync.rowfit.tracking.ends import ends
 from psvideo.sync.rowfit.tracking.track import track
 from psvideo.sync.verdict.believed import convincing
 from psvideo.sync.verdict.refusal import clock_too_far
-from psvideo.synth import Exposure, Noise, TrueClock, TrueFlash, expose
+from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 NOISE = Noise(full_well_e=20_000, read_e=8)
@@ -204,31 +203,6 @@ def test_a_hole_after_a_few_frames_of_a_short_clip_is_found(end: str, count: int
     timing = retimed(plan, shown)
     assert_placed(timing, shown)
     assert rms_rows(timing, plan, int(shown.max()) + 1) < 0.05
-
-
-@pytest.mark.parametrize("moving", [False, True])
-@pytest.mark.parametrize("count", [2, 5])
-def test_a_hole_that_tracking_found_near_an_end_is_kept_only_where_those_few_frames_fit_nowhere_else(
-    count: int, moving: bool, plan: Plan
-) -> None:
-    """Before a subject that moves, five frames fitted ten places farther on by chance, under other lights' names."""
-    rng, gone = np.random.default_rng(5), 9
-    shape = (plan.camera.height_px, plan.camera.width_px)
-    walls = {slot: rng.random(shape) for slot in plan.lit_slots}
-
-    def plate_of(flash: TrueFlash) -> NDArray[np.float32]:
-        wall = rng.random(shape) if moving else walls.get(flash.slot, np.zeros(shape))
-        return np.where(flash.slot in plan.lit_slots, 0.2 + 0.5 * wall, 0.0).astype(np.float32)
-
-    clock = TrueClock(phase_s=0.0123, offset_ppm=0.0)
-    shot = expose(plate_of, plan, frames=FRAMES + gone, clock=clock, noise=NOISE, bits=12)
-    tracked = np.arange(FRAMES) + np.where(np.arange(FRAMES) >= FRAMES - count, gone, 0)
-    rows = profiles_of(plan, shot).take(slice(0, FRAMES))
-    rows = rows if moving else replace(rows, value=profiles_of(plan, shot).value[tracked])
-    beat = first_guess(plan).with_phase(clock.phase_s)
-    placed = ends(plan, rows, tracked, beat)
-    assert (placed.index == (np.arange(FRAMES) if moving else tracked)).all()
-    assert moving or placed.lost_last == 0
 
 
 @pytest.mark.parametrize("end", ["first", "last"])

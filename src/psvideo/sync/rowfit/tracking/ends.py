@@ -41,82 +41,38 @@ class ClipEnds:
 def ends(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> ClipEnds:
     """Return the places in time (frame,) with holes beside the first and the last frames found."""
     last, lost_last = _end(plan, rows, index, beat)
-    turned = replace(rows, value=np.ascontiguousarray(rows.value[::-1]), index=rows.index[::-1])
+    turned = replace(rows, value=np.ascontiguousarray(rows.value[::-1]))
     first, lost_first = _end(plan, turned, last[::-1], beat)
     return ClipEnds(index=first[::-1].copy(), lost_first=lost_first, lost_last=lost_last)
 
 
 def _end(plan: Plan, rows: Profiles, index: Integers, beat: Beat) -> tuple[Integers, int]:
-    """Return the places with the end of the arrays put where it fits, and how many frames there fit nowhere, or at more
-    than one place.
+    """Return the places with the end of the arrays put where it fits, and how many frames there fit nowhere.
 
     From the inside outwards, so that nothing is predicted from frames that are odd themselves. A frame in the dark that
     was taken for a repeat of the one before it may as well be a later one in the dark.
     """
     onward = int(np.sign(index[-1] - index[0]))
     room = len(index) - BEFORE - max(LEAST_KNOWN, 2 * (len(plan.lit_slots) + 1))
-    most = min(AT_END, room)
-    followed = _beyond_hole(rows, index, most)
-    if followed:
-        index = _without_hole(rows, index, followed)
-        extra = _only_place(plan, rows, index, beat, followed)
-        return (index, followed) if extra is None else (_away(index, followed, onward * extra), 0)
-    for count in range(most, 0, -1):
-        own, bar = _own_place(plan, rows, index, beat, count)
+    for count in range(min(AT_END, room), 0, -1):
+        known = slice(max(len(index) - count - MEMORY, 0), len(index) - count)
+        usual = _usual(plan, rows, index, beat, known)
+        bar = max(ODD * usual, usual + SUSPICIOUS)
+        own = _fits_as_numbered(plan, rows, index, beat, known)
         repeated = bool(index[-count] == index[-count - 1])
         if own[0] < bar and not repeated:
             continue
-        extra = _only_place(plan, rows, index, beat, count)
-        if extra is not None:
-            return _away(index, count, onward * extra), 0
+        places = [index[-count:] + onward * extra for extra in range(1, MOST + 1)]
+        worst = np.array([own.max(), *(_fits(plan, rows, index, beat, known, place).max() for place in places)])
+        best = int(worst.argmin())
+        nearer, farther = worst[:best], worst[best + 1 :]
+        if worst[best] < bar and (nearer > ODD * max(worst[best], usual)).all() and (farther > ODD * worst[best]).all():
+            moved = index.copy()
+            moved[-count:] += onward * best
+            return moved, 0
         if repeated or (own >= bar).all():
             return index, count
     return index, 0
-
-
-def _beyond_hole(rows: Profiles, index: Integers, most: int) -> int:
-    """Return how many of the last frames, up to ``most``, lie beyond a hole that tracking found, and follow one another
-    as their numbers say; 0 where none do. Few as they are, they may fit there by chance where the subject moves."""
-    if most <= 0:
-        return 0
-    more = np.abs(index[-most:] - index[-most - 1]) - np.abs(rows.index[-most:] - rows.index[-most - 1])
-    near = np.flatnonzero(more <= 0)
-    count = most - 1 - int(near[-1]) if len(near) else most
-    return count if count and np.ptp(more[-count:]) == 0 else 0
-
-
-def _without_hole(rows: Profiles, index: Integers, count: int) -> Integers:
-    """Return the places with the last ``count`` frames as their numbers put them behind those before them."""
-    taken_back = rows.index[-count] - rows.index[-count - 1] - (index[-count] - index[-count - 1])
-    return _away(index, count, int(taken_back))
-
-
-def _away(index: Integers, count: int, extra: int) -> Integers:
-    moved = index.copy()
-    moved[-count:] += extra
-    return moved
-
-
-def _own_place(plan: Plan, rows: Profiles, index: Integers, beat: Beat, count: int) -> tuple[Doubles, float]:
-    """Return how badly the last ``count`` frames fit the places that they have, (frame,), and what is too badly."""
-    known = slice(max(len(index) - count - MEMORY, 0), len(index) - count)
-    usual = _usual(plan, rows, index, beat, known)
-    return _fits_as_numbered(plan, rows, index, beat, known), max(ODD * usual, usual + SUSPICIOUS)
-
-
-def _only_place(plan: Plan, rows: Profiles, index: Integers, beat: Beat, count: int) -> int | None:
-    """Return by how many frames the last ``count`` are farther away than ``index`` says, where that is the only place
-    that they fit; else None."""
-    onward = int(np.sign(index[-1] - index[0]))
-    known = slice(max(len(index) - count - MEMORY, 0), len(index) - count)
-    usual = _usual(plan, rows, index, beat, known)
-    own, bar = _own_place(plan, rows, index, beat, count)
-    places = [index[-count:] + onward * extra for extra in range(1, MOST + 1)]
-    worst = np.array([own.max(), *(_fits(plan, rows, index, beat, known, place).max() for place in places)])
-    best = int(worst.argmin())
-    nearer, farther = worst[:best], worst[best + 1 :]
-    only = (nearer > ODD * max(worst[best], usual)).all() and (farther > ODD * worst[best]).all()
-    return best if worst[best] < bar and only else None
 
 
 def _usual(plan: Plan, rows: Profiles, index: Integers, beat: Beat, known: slice) -> float:
