@@ -18,6 +18,7 @@ import pytest
 from filmed import filmed
 from picture_file import read_picture
 
+import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import Take
 from psvideo.errors import NoStrobeError
@@ -30,10 +31,16 @@ from psvideo.sync.take_timing import find_timing
 
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
 SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")
+EVEN = ((0.6, 0.0), (0.0, 0.6), (-0.6, 0.0), (0.0, -0.6))
 SCENES = {
     "good": SCENE,
     "dead": SCENE.replace('name = "left"\n', 'name = "left"\nintensity = 0.0001\n'),
     "clips": SCENE.replace('name = "key"\n', 'name = "key"\nintensity = 1.8\n'),
+    "ring": re.sub(
+        r"(?s)\[\[light\]\].*(?=\[\[object\]\])",
+        "".join(f'[[light]]\nname = "light{n}"\ndirection = [{x}, {y}, 0.8]\n' for n, (x, y) in enumerate(EVEN)),
+        SCENE,
+    ),
     "room": SCENE + "\n[ambient]\nlevel = 0.6\n",
 }
 
@@ -425,3 +432,20 @@ def test_a_rig_that_explains_the_light_of_another_surface_is_no_good_rig(
     assert run("check", shot("good"), "--rig", tmp_path / "mirrored.toml") == 1
     assert "normals cannot be those of one surface" in " ".join(capsys.readouterr().out.split())
     assert run("check", shot("good"), "--rig", shot("good") / "rig.toml") == 0
+
+
+@pytest.mark.parametrize(("haze", "doubted"), [(0.0, False), (0.08, True)])
+def test_light_that_is_added_alike_by_all_lamps_is_no_usable_take_before_the_run_either(
+    shot: Callable[[str], Path], tmp_path: Path, *, haze: float, doubted: bool
+) -> None:
+    """Haze before four lights at one slant leaves no residual: check called usable what normals did not."""
+    clip = tmp_path / "clip"
+    shutil.copytree(shot("ring"), clip)
+    for path in sorted((clip / "frames").iterdir()):
+        codes = read_picture(path).astype(np.float64)
+        lit = np.percentile(codes, 99, axis=(1, 2), keepdims=True) - codes.min()
+        cv2.imwrite(str(path), np.clip(codes + haze * lit, 0, 65535).astype(np.uint16))
+    found = ps.check(clip, rig=clip / "rig.toml")
+    grades = {line.subject: line.grade for line in found.judgements}
+    assert grades["rig"] != "bad"
+    assert ("doubtful" in (grades.get("accuracy"), grades.get("validity"))) == doubted

@@ -24,9 +24,11 @@ from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.every_line import judgements
+from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame_light, later_frames
 from psvideo.report.judge.of_rows import MOST_UNSEEN
-from psvideo.report.judge.typical_error import NOISY_DEG
+from psvideo.report.judge.of_validity import first_of_all, validity
+from psvideo.report.judge.typical_error import NOISY_DEG, moves
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import thinned_round
 from psvideo.report.observe.observed import Observed
@@ -185,11 +187,11 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     unmixing = None if known is None else unmixing_of(plan, known, channels=take.clip.channels)
     apart = take.unmixed(unmixing)
     rig = known if unmixing is None else unmixing.rig
-    observed = observing(apart, rig)
+    observed, solved = observing(apart, rig), None
     for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
         observed.add(one)
         if rig is not None and not observed.away and one.lights == apart.plan.lights:
-            _look_at_normals(observed, one, apart.plan, rig)
+            solved = _look_at_normals(observed, one, apart, rig)
         del one
     if not observed.facts:
         raise PsvideoError(
@@ -210,13 +212,19 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
         saturation=saturation,
         levels=levels,
     )
-    return (seen, *judged)
+    if solved is None or moves(observed.facts):  # plates of what moves are not brought together here
+        return (seen, *judged)
+    return (seen, *judged, *accuracy(solved), *validity(solved, first=first_of_all(judged)))
 
 
-def _look_at_normals(observed: Observed, one: Round, plan: Plan, rig: Rig) -> None:
+def _look_at_normals(observed: Observed, one: Round, take: Take, rig: Rig) -> Observed | None:
     """Solve a round and look whether its normals are one surface's, trusted or not, and face outwards at its outline:
     directions that are mirrored, or lights exchanged, explain the plates as well. Near lights would need the surface's
-    distance for it; noise belongs to no surface, nor does a round that was not seen whole."""
+    distance for it; noise belongs to no surface, nor does a round that was not seen whole.
+
+    Returns what is seen of that round alone beside its normals, None where it was not solved or is noise.
+    """
+    plan = take.plan
     lights, whole = rig.select(plan.lights), observed.facts[-1].unseen_share <= MOST_UNSEEN
     if whole and len(lights) >= LEAST_LIGHTS and all(light.direction is not None for light in lights):
         surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True))).surface
@@ -224,6 +232,10 @@ def _look_at_normals(observed: Observed, one: Round, plan: Plan, rig: Rig) -> No
             some = thin_surface(surface)
             observed.look_at_slopes(surface, some)
             observed.look_at_outline(some, thinned_round(one, None))
+            alone = observing(take, rig)
+            alone.add(one, surface)
+            return alone
+    return None
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:

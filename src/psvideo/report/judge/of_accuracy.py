@@ -55,7 +55,7 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
             found="How far normals are off beyond noise is not known: three lights explain any surface, also one that "
             "shines or lies in other light, and cannot check each other. On photographs of a ball, a bear, a "
             "cat and a sphere typical normals were off by 3 to 11 degrees under three. Four lights and more show it.",
-            advice='`aov=["error"]` counts what such surfaces left, and how far noise spreads.',
+            advice='Normals with `aov=["error"]` count what such surfaces left, and how far noise spreads.',
         )
     if error_deg is None or error_deg < by_noise_deg(observed.facts):  # what noise hides cannot be told from it
         return
@@ -69,7 +69,7 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
         subject="accuracy",
         grade="bad" if error_deg > LOST_DEG else "doubtful",
         found=f"{found}: {cause}.",
-        advice=f'{advice}; `aov=["error"]` says how far off each pixel may be.',
+        advice=f'{advice}; normals with `aov=["error"]` say how far off each pixel may be.',
     )
 
 
@@ -82,7 +82,7 @@ def off_by_albedo(observed: Observed) -> Judgement | None:
         subject="accuracy",
         grade="bad" if slope_deg > LOST_DEG else "doubtful",
         found=f"A typical normal is off by about {slope_deg:.0f} degrees: albedo {GOES_WITH_SLOPE}.",
-        advice=f'{BESIDE_THE_OTHERS}; `aov=["error"]` says how far off each pixel may be.',
+        advice=f'{BESIDE_THE_OTHERS}; normals with `aov=["error"]` say how far off each pixel may be.',
     )
 
 

@@ -58,7 +58,8 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
     usual, least, most = float(np.median(shares)), min(shares), max(shares)
     found = f"{100 * usual:.0f} % of the subject has a normal to be trusted"
     if usual >= LEAST_VALID:
-        yield Judgement(subject="validity", grade="good", found=f"{found} ({100 * least:.0f} % in the worst round).")
+        worst = f" ({100 * least:.0f} % in the worst round)" if len(known) > 1 else ""
+        yield Judgement(subject="validity", grade="good", found=f"{found}{worst}.")
         return
     reached = [one.measured_share for one in known if one.measured_share is not None]
     reach = float(np.median(reached)) if reached else 0.0
@@ -102,29 +103,30 @@ def _trusting(observed: Observed) -> str:
         return (
             f"Albedo {GOES_WITH_SLOPE}; or paint does so here. Three lights cannot tell. Use a fourth light, which "
             "shows how far normals are off, or six or more at different angles to the lens, which take most of it off. "
-            '`aov=["error"]` says how far off each pixel may be.'
+            'Normals with `aov=["error"]` say how far off each pixel may be.'
         )
     if off_deg(observed) is None and steady_beyond_noise(observed) and not said:
         return (
             "Measure the lights again, clear the air and darken the room, or use more lights; brighter ones do not "
-            'help. `aov=["error"]` says how far off each pixel may be.'
+            'help. Normals with `aov=["error"]` say how far off each pixel may be.'
         )
     noise_deg = by_noise_deg(observed.facts)
     if moves(observed.facts) and noise_deg > NOISY_DEG:
         return (
             f"Noise alone turns a typical normal by {noise_deg:.0f} degrees: give more light, or use more lights. What "
-            'moves must move slower besides, if it is lost then. `aov=["error"]` says how far off each pixel may be.'
+            'moves must move slower besides, if it is lost then. Normals with `aov=["error"]` say how far off each '
+            "pixel may be."
         )
     if moves(observed.facts):
         return (
             "Move slower, raise the frame rate or flash fewer lights, and give fine detail to follow: plates of what "
             "moves must be brought together. If nothing moved, light flickers, or the movie's coding changes the "
-            'pictures. `aov=["error"]` says how far off each pixel may be.'
+            'pictures. Normals with `aov=["error"]` say how far off each pixel may be.'
         )
     if said and noise_deg < LITTLE_NOISE_DEG:
         return "More light does not help; the line on the typical error says what does."
     if next(distance(observed), None) is not None:
         return "More lights help, and a depth that is known; the line on distance says why."
     return "Give more light, or use more lights" + (
-        "." if said else '; `aov=["error"]` says how far off each pixel may be.'
+        "." if said else '; normals with `aov=["error"]` say how far off each pixel may be.'
     )
