@@ -442,7 +442,7 @@ def test_light_that_is_added_alike_by_all_lamps_is_no_usable_take_before_the_run
     clip = tmp_path / "clip"
     shutil.copytree(shot("ring"), clip)
     for path in sorted((clip / "frames").iterdir()):
-        codes = read_picture(path).astype(np.float64)
+        codes = read_picture(path, cv2.IMREAD_UNCHANGED).astype(np.float64)
         lit = np.percentile(codes, 99, axis=(1, 2), keepdims=True) - codes.min()
         cv2.imwrite(str(path), np.clip(codes + haze * lit, 0, 65535).astype(np.uint16))
     found = ps.check(clip, rig=clip / "rig.toml")
