@@ -13,13 +13,14 @@ import pytest
 from written_movies import RATE, grey_ramp, in_10_bits, make_frame, write_movie
 
 from psvideo.clip import Take, open_clip, read_frames
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.inspect.describe import describe
 from psvideo.model.plan import Plan
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import scheduled
 from psvideo.runs.steps.output import tags_of, take_rate
+from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_timing
 from psvideo.synth import TrueClock, expose
 
@@ -188,6 +189,22 @@ def test_frames_of_a_rate_that_changes_are_taken_at_their_own_times(tmp_path: Pa
     assert all(at_s == pytest.approx(middle_s + (n - 1001) / float(RATE), abs=1e-9) for n, at_s in shown.items())
     with pytest.raises(UsageError, match="vary in rate"):
         take_rate("frame", take, shutter=180)
+
+
+def test_stamps_that_leave_out_frames_which_none_is_missing_of_are_what_is_named(
+    tmp_path: Path, make_plan: PlanMaker
+) -> None:
+    """A program skipped a place after every seventh frame of a strobe that no frame missed: the plan was blamed."""
+    plan = make_plan(width_px=8, height_px=60, fps=RATE)
+    plates = [None if flash.is_dark else np.full((60, 8), 0.3 + 0.1 * n) for n, flash in enumerate(plan.flashes)]
+    shot = expose(plates, plan, frames=44, clock=TrueClock(phase_s=0.0123, offset_ppm=40.0))
+    frames = [make_frame([(65535 * frame).astype(np.uint16)], "gray16le") for frame in np.clip(shot.frames, 0, 1)]
+    (tmp_path / "plan.toml").write_text(format_plan(plan))
+    write_movie(tmp_path / "even.mkv", frames)
+    write_movie(tmp_path / "x.mkv", frames, places=[n + n // 7 for n in range(44)])
+    assert find_timing(open_take(tmp_path / "even.mkv")).dropped_frames == ()
+    with pytest.raises(NoStrobeError, match=r"x\.mkv: its time stamps leave out 6 frames \(after number 6, 14, 22, 30"):
+        find_timing(open_take(tmp_path / "x.mkv"))
 
 
 def test_a_rate_that_changes_is_refused_where_every_frame_is_to_have_its_flash(

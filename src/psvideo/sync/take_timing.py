@@ -1,5 +1,6 @@
 """A take's timing: its frames are decoded once, for their row profiles, and the flashes are found in these."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +9,15 @@ from numpy.typing import NDArray
 from psvideo.clip import Take, check_take, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
+from psvideo.errors import NoStrobeError
 from psvideo.model.arrays import Doubles
 from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.model.units import counted
 from psvideo.sync.find import timing_from_rows
+
+MOST_NAMED = 8
+"""Holes that a sentence names."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,15 +47,41 @@ def take_profiles(take: Take, *, watch: Watch = unwatched) -> TakeProfiles:
 
 def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str | None = None) -> Timing:
     """Return when every flash fired. Raises PsvideoError where no strobe is found."""
-    return timing_from_rows(
-        take.plan,
-        profiles.index,
-        profiles.value,
-        clip=take.clip.name,
-        first_light=first_light,
-        dropped=tuple(DroppedFrames(after=after, count=count) for after, count in take.clip.dropped),
-        numbers=take.numbers,
-        doubt=profiles.doubt,
+    try:
+        return timing_from_rows(
+            take.plan,
+            profiles.index,
+            profiles.value,
+            clip=take.clip.name,
+            first_light=first_light,
+            dropped=tuple(DroppedFrames(after=after, count=count) for after, count in take.clip.dropped),
+            numbers=take.numbers,
+            doubt=profiles.doubt,
+        )
+    except NoStrobeError:
+        if take.clip.is_movie and take.clip.dropped and _found_without_gaps(take, profiles):
+            raise _stamps_are_false(take) from None
+        raise
+
+
+def _found_without_gaps(take: Take, profiles: TakeProfiles) -> bool:
+    """Return whether the strobe is found as if no frame had been left out, and none is missing then."""
+    index = np.arange(len(profiles.index), dtype=np.int64)
+    with suppress(NoStrobeError):
+        found = timing_from_rows(take.plan, index, profiles.value, clip=take.clip.name, doubt=profiles.doubt)
+        return not found.dropped_frames
+    return False
+
+
+def _stamps_are_false(take: Take) -> NoStrobeError:
+    holes = take.clip.dropped
+    shown = ", ".join(str(after) for after, _ in holes[:MOST_NAMED]) + (" …" if len(holes) > MOST_NAMED else "")
+    missing = counted(sum(count for _, count in holes), "frame")
+    return NoStrobeError(
+        f"{take.clip.path}: its time stamps leave out {missing} (after number {shown}), and the picture shows that "
+        "none is missing there: with frames at even distances the strobe is found, with the stamps it is not. They are "
+        "not the camera's. Bring the frames into a folder of numbered files without them (ffmpeg -i FILE -fps_mode "
+        "passthrough FOLDER/%06d.png), with the plan beside them, or use the file that the camera wrote."
     )
 
 
