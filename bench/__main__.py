@@ -30,6 +30,7 @@ TABLES = (
     "rolling",
     "accuracy",
     "predicted",
+    "few_lights",
     "verdicts",
     "verdict_rigs",
 )
