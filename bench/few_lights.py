@@ -34,13 +34,15 @@ SUBJECTS: dict[str, Callable[[], Case]] = {
 
 
 class Trusted(NamedTuple):
-    """The mean over sets: the share of the subject that is trusted, how much of it is over 10 degrees (of the worst
-    set as well); of what was measured the shares within the claim and within twice, and its correlation with truth."""
+    """The mean over sets: the share of the subject that is trusted, and how much of it is over 10 degrees; the latter
+    of all sets' pixels together, and of the worst set, as well. Of what was measured the shares within the claim and
+    within twice, and its correlation with truth."""
 
     subject: str
     lights: int
     trusted: str
     over_10_deg: str
+    of_all_pixels: str
     worst: str
     within: str
     within_twice: str
@@ -104,6 +106,7 @@ def _row(name: str, count: int, sets: list[_Set]) -> Trusted:
         lights=count,
         trusted=f"{100 * mean('trusted'):.0f} %",
         over_10_deg=f"{100 * mean('over'):.1f} %",
+        of_all_pixels=f"{100 * sum(one.over * one.trusted for one in sets) / sum(one.trusted for one in sets):.1f} %",
         worst=f"{100 * max(one.over for one in sets):.0f} %",
         within=f"{100 * mean('within'):.0f} %",
         within_twice=f"{100 * mean('within_twice'):.0f} %",

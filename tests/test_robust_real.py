@@ -161,3 +161,15 @@ def test_over_real_objects_errors_under_few_lights_are_claimed_right_to_a_factor
     assert (off <= 2 * said).mean() >= 0.9
     for share in (50, 90):
         assert 1 / 1.5 < np.percentile(said, share) / np.percentile(off, share) < 1.5
+
+
+@pytest.mark.parametrize("lights", [[0, 2, 14, 28, 31, 42], [0, 2, 17, 33, 34, 38], [0, 3, 5, 7, 26, 42]])
+@pytest.mark.usefixtures("shared_data")
+def test_a_glossy_ball_is_not_taken_for_wax_by_normals_that_face_away(lights: list[int]) -> None:
+    """Light that shines through was found, and normals turned by 14 degrees were claimed at 4."""
+    case = diligent_ball().choose(np.array(lights))
+    found = Solving().solve(case.plates, case.lit, mask=case.mask)
+    trusted = found.valid & case.mask
+    off_deg = angles_deg(found.normals[trusted], case.truth[trusted])
+    assert trusted.sum() > 0.3 * case.mask.sum()
+    assert (off_deg > 10).mean() < 0.05

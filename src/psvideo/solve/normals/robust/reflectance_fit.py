@@ -46,6 +46,9 @@ LEAST_ROUGH = 0.1
 """What is less rough (facets that lean by 9 degrees) turns normals by less than a degree. Other faults look like it."""
 LEAST_SOFT = 0.04
 """What is less soft turns normals by about a degree."""
+MOST_AWAY = 0.02
+"""What a camera sees faces it. Softness that is not there tilts normals until more of them than this face away (0.06 to
+0.15 of a glossy ball and a bear under six lights, whose normals it turned by 12 to 22 degrees; none of wax or skin)."""
 PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3, 0.3), 300.0
 """The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
@@ -120,7 +123,7 @@ def fitted(points: SubjectPoints) -> Reflectance | None:
     kind, best = "shining", alternated(points, g, typical)
     for other in _to_try(points):
         found = alternated(points, g, typical, other)
-        if _leaves_less(found, best, other, few=few):
+        if _leaves_less(found, best, other, few=few) and (other == "rough" or _faces_it(points, found.g, best.g)):
             kind, best = other, found
     if best.explained < LEAST_EXPLAINED or (few and kind == "shining"):
         return None
@@ -139,6 +142,12 @@ def _leaves_less(found: ModelFollowed, before: ModelFollowed, kind: Literal["rou
     if kind == "rough":
         return bool(number >= LEAST_ROUGH and left < LESS_LEFT)
     return bool(LEAST_SOFT <= number < MOST_SOFT and left < (FEW_LEAVE if few else MUCH_LESS_LEFT))
+
+
+def _faces_it(points: SubjectPoints, g: Doubles, before: Doubles) -> bool:
+    """Return whether normals (of any length) face the camera, but for few more than ``before``."""
+    away, were = (((points.to_camera * one).sum(axis=-1) < 0).mean() for one in (g, before))
+    return bool(away <= were + MOST_AWAY)
 
 
 def sizes_of(points: SubjectPoints) -> Doubles:
