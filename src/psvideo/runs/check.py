@@ -30,9 +30,7 @@ from psvideo.report.judge.of_rows import MOST_UNSEEN
 from psvideo.report.judge.of_validity import first_of_all, validity
 from psvideo.report.judge.typical_error import NOISY_DEG, moves
 from psvideo.report.judgement import Judgement
-from psvideo.report.observe.facts import thinned_round
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.thinned import thin_surface
 from psvideo.runs.instants.reporting import observing
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
@@ -229,11 +227,11 @@ def _look_at_normals(observed: Observed, one: Round, take: Take, rig: Rig) -> Ob
     if whole and len(lights) >= LEAST_LIGHTS and all(light.direction is not None for light in lights):
         surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True))).surface
         if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
-            some = thin_surface(surface)
-            observed.look_at_slopes(surface, some)
-            observed.look_at_outline(some, thinned_round(one, None))
             alone = observing(take, rig)
             alone.add(one, surface)
+            observed.slopes += alone.slopes
+            observed.away += alone.away
+            observed.outward += alone.outward
             return alone
     return None
 

@@ -79,9 +79,9 @@ def _stamps_are_false(take: Take) -> NoStrobeError:
     missing = counted(sum(count for _, count in holes), "frame")
     return NoStrobeError(
         f"{take.clip.path}: its time stamps leave out {missing} (after number {shown}), and the picture shows that "
-        "none is missing there: with frames at even distances the strobe is found, with the stamps it is not. They are "
-        "not the camera's. Bring the frames into a folder of numbered files without them (ffmpeg -i FILE -fps_mode "
-        "passthrough FOLDER/%06d.png), with the plan beside them, or use the file that the camera wrote."
+        "none is missing there: with frames evenly spaced the strobe is found, with the stamps it is not. So they are "
+        "not the camera's. Use the file that the camera wrote, or extract the frames to a folder of numbered files, "
+        "which have no stamps (ffmpeg -i FILE -fps_mode passthrough FOLDER/%06d.png), and put the plan beside them."
     )
 
 
