@@ -449,3 +449,21 @@ def test_light_that_is_added_alike_by_all_lamps_is_no_usable_take_before_the_run
     grades = {line.subject: line.grade for line in found.judgements}
     assert grades["rig"] != "bad"
     assert ("doubtful" in (grades.get("accuracy"), grades.get("validity"))) == doubted
+
+
+def test_a_rig_that_is_turned_by_180_degrees_shows_where_the_subject_ends(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Four lights at one slant explain the plates as well the other way round, by a ball that is a bowl."""
+    clip = shot("ring")
+    turned = re.sub(
+        r"direction = \[([-\d.e]+), ([-\d.e]+),",
+        lambda m: f"direction = [{-float(m[1])!r}, {-float(m[2])!r},",
+        (clip / "rig.toml").read_text(),
+    )
+    (tmp_path / "turned.toml").write_text(turned)
+    said = []
+    for rig in (clip / "rig.toml", tmp_path / "turned.toml"):
+        assert run("check", clip, "--rig", rig) == 0
+        said.append(" ".join(capsys.readouterr().out.split()))
+    assert ["do not face outwards where the subject ends" in one for one in said] == [False, True]
