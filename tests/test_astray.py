@@ -20,6 +20,7 @@ from psvideo.report.judge.of_motion import motion
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import Astray, astray
 from psvideo.report.observe.alignment.part_places import PartPlaces, places_of_parts
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
@@ -241,7 +242,7 @@ def test_four_lights_do_not_say_where_pictures_lie() -> None:
 
 
 def judged(found: Astray | None) -> tuple[Judgement, list[Judgement]]:
-    observed = Observed(lights=("a", "b"), astray=[] if found is None else [found])
+    observed = Observed(lights=("a", "b"), closely=CloseLooks(astray=[] if found is None else [found]))
     facts = InstantFacts(number=1001, time_s=0.0, valid_share=0.5, clipped_share=0.0, unseen_share=0.0)
     observed.facts.append(replace(facts, misfit=Misfit(share=0.05, error_deg=8.0)))
     timing = Timing(

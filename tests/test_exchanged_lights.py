@@ -9,6 +9,7 @@ from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judge.rig_by_plates import lights_exchanged
 from psvideo.report.judge.typical_error import MEAN_OF_HELD
 from psvideo.report.observe.alignment.astray import Astray
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
@@ -80,7 +81,7 @@ def observed_of(fit: RigFit, monkeypatch: pytest.MonkeyPatch, *, astray: list[As
     monkeypatch.setattr(Observed, "firing_lights", NAMES)
     misfit = Misfit(share=0.1, error_deg=6.0 / MEAN_OF_HELD)
     facts = InstantFacts(number=1, time_s=0.0, valid_share=0.9, clipped_share=0.0, unseen_share=0.0, misfit=misfit)
-    return Observed(lights=NAMES, facts=KeptFacts([facts]), astray=astray)
+    return Observed(lights=NAMES, facts=KeptFacts([facts]), closely=CloseLooks(astray=astray))
 
 
 def test_a_rig_that_does_not_fit_is_not_known_to_be_wrong_where_pictures_are_not_aligned(

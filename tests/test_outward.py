@@ -124,7 +124,7 @@ def said_of(shape: tuple[Array, Mask], ways: Array, claimed: Array, *, guessed: 
         for name, one in zip(observed.lights, plates, strict=True)
     )
     observed.add(Round(number=1001, plates=shown), surface)
-    observed.leans.clear()
+    observed.closely.leans.clear()
     (line,) = judge_rig(observed, guessed=guessed)
     return line
 

@@ -11,6 +11,7 @@ import psvideo as ps
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_folders import begun_folder, whole_folder
 from psvideo.report.observe.against_noise import AgainstNoise
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
@@ -43,11 +44,13 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
         lights=("a", "b"),
         facts=KeptFacts([facts]),
         counts={"a": np.arange(5), "b": np.arange(5) * 2},
-        blurs_px=[0.7],
-        noises=[AgainstNoise(level=1 / 3, read=1e-6, photon=2 / 3)],
-        leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
+        closely=CloseLooks(
+            blurs_px=[0.7],
+            noises=[AgainstNoise(level=1 / 3, read=1e-6, photon=2 / 3)],
+            leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
+            in_shadow=[0.04],
+        ),
         light_at_points=[PointLight(np.random.default_rng(1).random((4, 2)), np.array([1.0, 4.0]))],
-        in_shadow=[0.04],
         ambient_measured={128: 0.25},
         worst=Worst([worst]),
     )
@@ -56,9 +59,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     ((numbers, found),) = noted(tmp_path)
     seen = found.observed
     assert (numbers, found.reserved, list(seen.facts)) == (range(1003, 1004), ("No scale.",), [facts])
-    assert (seen.blurs_px, seen.ambient_measured) == ([0.7], {128: 0.25})
-    assert seen.noises == observed.noises
-    assert (seen.leans, seen.in_shadow) == (observed.leans, [0.04])
+    assert (seen.closely, seen.ambient_measured) == (observed.closely, {128: 0.25})
     assert all(np.array_equal(seen.counts[light], observed.counts[light]) for light in observed.counts)
     assert np.array_equal(seen.light_at_points[0].light, observed.light_at_points[0].light)
     assert seen.light_at_points[0].white.tolist() == [1.0, 4.0]
@@ -69,15 +70,17 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
 
 
 def test_every_number_that_was_noted_of_a_round_comes_back_and_follows_those_before(tmp_path: Path) -> None:
-    names = [one.name for one in fields(Observed) if one.type == list[float]]
+    names = [one.name for one in fields(CloseLooks) if one.type == list[float]]
     assert {"slopes", "away", "outward", "in_shadow"} <= set(names)
     one = Observed(lights=("a",))
     for n, name in enumerate(names):
-        getattr(one, name).append(0.25 + n)
+        getattr(one.closely, name).append(0.25 + n)
     write_notes(tmp_path, range(3, 5), Found(observed=one))
     ((_, found),) = noted(tmp_path)
     one.followed_by(found.observed)
-    assert {name: getattr(one, name) for name in names} == {name: [0.25 + n] * 2 for n, name in enumerate(names)}
+    assert {name: getattr(one.closely, name) for name in names} == {
+        name: [0.25 + n] * 2 for n, name in enumerate(names)
+    }
 
 
 def test_damaged_notes_are_refused_by_name(tmp_path: Path) -> None:

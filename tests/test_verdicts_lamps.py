@@ -32,6 +32,7 @@ from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import verdict_of
 from psvideo.report.observe.against_noise import AgainstNoise
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import count_levels
@@ -270,7 +271,7 @@ def test_no_power_is_advised_as_nothing(planned: float, said: str) -> None:
 def test_powers_of_log_footage_are_judged_by_noise_and_not_by_the_largest_code(read: float, said: list[str]) -> None:
     """The largest code of S-Log3 lies five stops above its white: 'open the aperture by 6.0 stops' would have clipped
     any sensor."""
-    one = Observed(lights=("a", "b"), noises=[AgainstNoise(level=0.0725, read=read, photon=0.0)])
+    one = Observed(lights=("a", "b"), closely=CloseLooks(noises=[AgainstNoise(level=0.0725, read=read, photon=0.0)]))
     for name, level in (("a", 0.0725), ("b", 0.0725 / 4)):
         one.counts[name] = count_levels(np.full(1000, level, np.float32), 1.0)
     plan = plan_of(one.lights)
@@ -279,17 +280,17 @@ def test_powers_of_log_footage_are_judged_by_noise_and_not_by_the_largest_code(r
     assert [part in words[name] for name, part in zip("ab", said, strict=True)] == [True, True], words
     known = replace(log, camera=replace(log.camera, encoding=Encoding(transfer="slog3", white_level=900)))
     assert "3.5 stops" in power_words(known, one)["a"]
-    assert power_words(log, replace(one, noises=[])) == {}
+    assert power_words(log, replace(one, closely=CloseLooks())) == {}
 
 
 @pytest.mark.parametrize(("gain", "weak"), [(0.15, False), (0.1, True)])
 def test_where_a_light_is_known_to_be_weaker_than_the_rig_says_no_turned_rig_is_named(gain: float, weak: bool) -> None:
     one = Footage(lights=3, gains=[1.0, gain, 1.0], solved=True).observed(0)
-    one.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(0.0, 20.0, 0.0), rest_deg=0.2)]
-    one.outward.clear()  # as of what has no outline
-    one.slopes[:] = [0.9]
+    one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(0.0, 20.0, 0.0), rest_deg=0.2)]
+    one.closely.outward.clear()  # as of what has no outline
+    one.closely.slopes[:] = [0.9]
     said = " ".join(line.found for line in rig_of(one))
-    one.slopes[:] = [0.2]
+    one.closely.slopes[:] = [0.2]
     assert any("mirrored" in line.found for line in rig_of(one)) is not weak
     assert ("swung to the left or right" in said) is not weak
     assert ("'light1'" in said) is weak

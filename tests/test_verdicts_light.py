@@ -37,6 +37,7 @@ from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judge.of_steps import COARSE_DEG, DEG_PER_STEP, coarse_steps
 from psvideo.report.observe.against_noise import AgainstNoise
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.code_steps import code_step
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
@@ -134,7 +135,7 @@ def test_light_that_is_left_in_attached_shadow_is_said_where_no_dark_slot_shows_
     surface = Solving().solve(plates, Illumination(directions=ways, intensities=np.ones((6, 1))))
     left = shadow_light(np.array(plates), np.ones((6, SIZE, SIZE), np.bool_), surface, ways, step=1)
     assert left is not None
-    one = Observed(lights=("a",), in_shadow=[left])
+    one = Observed(lights=("a",), closely=CloseLooks(in_shadow=[left]))
     assert ambient(one).grade == grade
     beside_dark = replace(one, facts=KeptFacts([facts_of(ambient=0.01)] * 3))  # which the dark slots hold none of
     assert ambient(beside_dark).grade == grade.replace("unknown", "good")

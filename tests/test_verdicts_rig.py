@@ -62,7 +62,7 @@ def test_four_lights_that_leave_what_wrong_directions_would_do_not_show_the_rig_
 
 def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s() -> None:
     one = Footage().observed(0)
-    one.slopes[:] = [-0.2]
+    one.closely.slopes[:] = [-0.2]
     guessed, known = (
         " ".join(f"{line.found} {line.advice}" for line in judge_rig(one, guessed=g)) for g in (True, False)
     )
@@ -74,7 +74,7 @@ def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s
 
 def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_not_blamed_alone() -> None:
     one = Footage(solved=True).observed(0)
-    one.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(20.0, 0.0, 0.0), rest_deg=0.2)]
+    one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(20.0, 0.0, 0.0), rest_deg=0.2)]
     (line,) = rig_of(one)
     assert (line.grade, "tilted up or down as a whole by about 20 degrees" in line.found) == ("bad", True)
     assert one.points is not None
@@ -129,7 +129,7 @@ def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_ex
     )
     found = lean(coarse_normals(surface), lens=lens)
     assert found is not None
-    one.leans[:] = [found]
+    one.closely.leans[:] = [found]
     doubted = [line for line in rig_of(one) if line.grade != "good"]
     assert [line.subject for line in doubted] == ([] if subject == "nothing" else [subject])
     assert verdict_of(doubted).startswith("This take is usable") == (subject != "rig")
@@ -149,7 +149,7 @@ def test_an_upright_pipe_beside_a_ball_speaks_for_no_lens_and_against_no_rig(see
     found = lean(coarse_normals(surface))  # a pipe fits any lens: every lens with a tilt of its own
     assert found is not None
     one = Footage(solved=True).observed(0)
-    one.leans[:] = [found]
+    one.closely.leans[:] = [found]
     assert {line.grade for line in rig_of(one)} == {"good"}
 
 
@@ -268,7 +268,7 @@ def test_three_lights_do_not_show_the_rig_to_be_right(gain: float, unmeasured: b
     (line,) = rig_of(one)
     assert line.grade == "unknown"
     assert "other strengths as well. Lights are hardly exchanged" in line.found
-    one.outward.clear()  # as of what has no outline
+    one.closely.outward.clear()  # as of what has no outline
     (line,) = rig_of(one)
     assert "other strengths or with two lights exchanged" in line.found
     assert "flat-field" in line.advice

@@ -135,8 +135,8 @@ def test_motion_and_sharpness_are_looked_for_in_plates_that_are_lit_where_the_fi
             one.look(plate)
         one.add(each)
     assert one.motion.watched == "light1"
-    assert one.blurs_px
-    assert one.blurs_px[0] < of_steadiness.SOFT_PX
+    assert one.closely.blurs_px
+    assert one.closely.blurs_px[0] < of_steadiness.SOFT_PX
     assert [facts.moving_share is not None and facts.moving_share > 0.05 for facts in one.facts[1:]] == [True, True]
 
 

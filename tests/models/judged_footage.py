@@ -302,7 +302,7 @@ def rig_of(one: Observed) -> list[Judgement]:
 
 def rig_but_leaning(one: Observed) -> list[Judgement]:
     """Judge the rig by all but how its normals lean, which shows sooner: the other lines hold where nothing bends."""
-    one.leans.clear()
+    one.closely.leans.clear()
     return rig_of(one)
 
 

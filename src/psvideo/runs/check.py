@@ -188,7 +188,7 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
     observed, solved = observing(apart, rig), None
     for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
         observed.add(one)
-        if rig is not None and not observed.away and one.lights == apart.plan.lights:
+        if rig is not None and not observed.closely.away and one.lights == apart.plan.lights:
             solved = _look_at_normals(observed, one, apart, rig)
         del one
     if not observed.facts:
@@ -229,9 +229,9 @@ def _look_at_normals(observed: Observed, one: Round, take: Take, rig: Rig) -> Ob
         if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
             alone = observing(take, rig)
             alone.add(one, surface)
-            observed.slopes += alone.slopes
-            observed.away += alone.away
-            observed.outward += alone.outward
+            observed.closely.slopes += alone.closely.slopes
+            observed.closely.away += alone.closely.away
+            observed.closely.outward += alone.closely.outward
             return alone
     return None
 

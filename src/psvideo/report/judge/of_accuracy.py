@@ -88,7 +88,7 @@ def off_by_albedo(observed: Observed) -> Judgement | None:
 
 def _why_off(observed: Observed) -> tuple[str, str]:
     """Return what makes normals wrong beyond noise, and what to do about it."""
-    if any(one.shows for one in observed.astray):
+    if any(one.shows for one in observed.closely.astray):
         return "the pictures are not aligned", "See the line on motion"
     fit = observed.rig_fit
     if fit is not None and fit.exchanged is not None:

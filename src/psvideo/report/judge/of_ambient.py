@@ -60,7 +60,7 @@ def ambient(observed: Observed) -> Judgement:
 
 
 def _left_in_shadow(observed: Observed) -> float:
-    return float(np.median(observed.in_shadow)) if observed.in_shadow else 0.0
+    return float(np.median(observed.closely.in_shadow)) if observed.closely.in_shadow else 0.0
 
 
 def _veiled(found: str, left: float) -> Judgement:
@@ -92,5 +92,5 @@ def _without_dark(observed: Observed) -> Judgement:
         subject="ambient",
         grade="unknown",
         found="Ambient light is not known: the plan has no dark slot, or none was complete."
-        + (" Where a light cannot reach, it is dark." if observed.in_shadow else ""),
+        + (" Where a light cannot reach, it is dark." if observed.closely.in_shadow else ""),
     )

@@ -62,7 +62,7 @@ def exposure(observed: Observed, *, under: Ceiling = "saturation") -> Iterator[J
     clipped = list(_clipping(levels))
     top_stops = max(one.stops(TARGET_QUANTILE) for one in levels.values())
     share = max(one.clipped_share for one in levels.values())
-    noise = usual(observed.noises) if under != "saturation" and observed.noises else None
+    noise = usual(observed.closely.noises) if under != "saturation" and observed.closely.noises else None
     without_noise = top_stops if noise is None else _without_noise(top_stops, noise)
     if without_noise < DIM_STOPS and noise is not None and noise.ratio < NOISY:
         yield _noisy(without_noise, noise, under)

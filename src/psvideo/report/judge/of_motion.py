@@ -85,7 +85,7 @@ def _slow(step_px: float, most_px: float) -> str:
 
 def _places(observed: Observed) -> Judgement:
     """Judge whether photographs of a still scene are aligned, where that can be told."""
-    found = observed.astray[0] if observed.astray else None
+    found = observed.closely.astray[0] if observed.closely.astray else None
     if found is not None and found.shows:
         return Judgement(
             subject="motion",

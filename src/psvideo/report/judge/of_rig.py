@@ -49,7 +49,7 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
         yield shining_surface(fit)
         return
     doubted = [one for one in (curve, wrong, crossed, away, near, None if near else leaning) if one]
-    if doubted and not said and any(one.shows for one in observed.astray):
+    if doubted and not said and any(one.shows for one in observed.closely.astray):
         yield Judgement(
             subject="rig",
             grade="unknown",
@@ -64,9 +64,9 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
         yield _beside_weaker(weaker)
     elif fit is not None:
         yield rig_explains(fit, lights=int(observed.firing.sum()))
-    elif observed.slopes and int(observed.firing.sum()) == ALL_EXPLAINED:
+    elif observed.closely.slopes and int(observed.firing.sum()) == ALL_EXPLAINED:
         yield three_lights(observed)
-    elif observed.slopes:  # of more lights too few points are lit by all, so that nothing else is known
+    elif observed.closely.slopes:  # of more lights too few points are lit by all, so that nothing else is known
         yield Judgement(subject="rig", grade="good", found="The normals fit together as one surface's.")
 
 

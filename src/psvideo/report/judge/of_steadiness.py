@@ -17,11 +17,11 @@ MOST_FLICKER_PERCENT = 1.0
 
 def focus(observed: Observed) -> Judgement:
     """Judge the sharpest edges."""
-    if not observed.blurs_px:
+    if not observed.closely.blurs_px:
         return Judgement(
             subject="focus", grade="unknown", found="Sharpness cannot be measured: no edge stands out of the noise."
         )
-    blur_px = float(np.median(observed.blurs_px))
+    blur_px = float(np.median(observed.closely.blurs_px))
     found = f"The sharpest edges are blurred by {blur_px:.1f} px."
     if blur_px <= SOFT_PX:
         return Judgement(subject="focus", grade="good", found=found)

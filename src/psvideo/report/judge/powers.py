@@ -26,7 +26,7 @@ def power_words(plan: Plan, observed: Observed) -> dict[str, str]:
     found = {light: observed.levels(light) for light in plan.lights if light in observed.counts}
     levels = {light: one for light, one in found.items() if one.total}
     if ceiling_of(plan.camera.encoding) == "the largest code":
-        return _by_noise(plan, levels, observed.noises)
+        return _by_noise(plan, levels, observed.closely.noises)
     whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
     return {light: _words(max(plan.powers(light)), one.right_power(whole)) for light, one in levels.items()}
 

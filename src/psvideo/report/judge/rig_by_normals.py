@@ -54,14 +54,14 @@ bear's under eight lights in one plane: 0.21; five lights of which each is taken
 
 def surface_shines(observed: Observed) -> bool:
     """Return whether normals are those of one surface as they are: then it is the surface that is not matte."""
-    agreement = float(np.median(observed.slopes)) if observed.slopes else 0.0
-    leans = [one for one in observed.leans if one.lean_deg > LEANS_DEG and one.gain > BY_SHINING]
-    return agreement >= ONE_SURFACE and len(leans) <= len(observed.leans) / 2
+    agreement = float(np.median(observed.closely.slopes)) if observed.closely.slopes else 0.0
+    leans = [one for one in observed.closely.leans if one.lean_deg > LEANS_DEG and one.gain > BY_SHINING]
+    return agreement >= ONE_SURFACE and len(leans) <= len(observed.closely.leans) / 2
 
 
 def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
     """Judge whether directions are mirrored or lights exchanged; ``guessed``: which light is which is a guess."""
-    agreement = float(np.median(observed.slopes)) if observed.slopes else 1.0
+    agreement = float(np.median(observed.closely.slopes)) if observed.closely.slopes else 1.0
     far = max((one.misfit.error_deg for one in observed.facts if one.misfit is not None), default=0.0) > TOO_FAR_DEG
     if agreement > (AGREE_FAR if far else AGREE) or not quiet(observed.facts):
         return None
@@ -152,12 +152,12 @@ def faces_outwards(observed: Observed) -> bool:
 
 
 def _facing(observed: Observed) -> float | None:
-    return float(np.median(observed.outward)) if observed.outward else None
+    return float(np.median(observed.closely.outward)) if observed.closely.outward else None
 
 
 def facing_away(observed: Observed) -> Judgement | None:
     """Judge whether normals face away from the camera; None where few do."""
-    share = float(np.median(observed.away)) if observed.away else 0.0
+    share = float(np.median(observed.closely.away)) if observed.closely.away else 0.0
     if share <= MOST_AWAY or not quiet(observed.facts):
         return None
     return Judgement(
@@ -172,9 +172,9 @@ def facing_away(observed: Observed) -> Judgement | None:
 
 def normals_lean(observed: Observed) -> Judgement | None:
     """Judge whether the normals would be one surface's if all were tilted alike; None where not."""
-    if not observed.leans or not quiet(observed.facts) or moves(observed.facts) or _clips(observed):
+    if not observed.closely.leans or not quiet(observed.facts) or moves(observed.facts) or _clips(observed):
         return None
-    usual = sorted(observed.leans, key=lambda one: one.lean_deg)[len(observed.leans) // 2]
+    usual = sorted(observed.closely.leans, key=lambda one: one.lean_deg)[len(observed.closely.leans) // 2]
     shown_deg = off_deg(observed) or 0.0
     if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= BY_LEANING:
         return None

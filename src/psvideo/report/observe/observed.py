@@ -22,18 +22,14 @@ from psvideo.model.turn import UPRIGHT, Turn
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
-from psvideo.report.observe.against_noise import AgainstNoise, against_noise
-from psvideo.report.observe.alignment.astray import Astray, astray
+from psvideo.report.observe.alignment.astray import astray
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import FAINT, Dark, Seen, instant_facts, thinned_round
-from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import BINS, Levels, count_levels
-from psvideo.report.observe.rig_and_curve.outward import outward
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.rigpoints import PointLight, RigPoints
-from psvideo.report.observe.rig_and_curve.slopes import Averaged, coarse_normals, share_away, surface_agreement
-from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
-from psvideo.report.observe.shadow import shadow_light
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
 from psvideo.report.observe.watched_motion import WatchedMotion
@@ -61,14 +57,14 @@ class Observed:
     known; ``points`` is where the rig is held against the plates.
     ``only`` are the numbers of rounds that are noted, None for all; the others serve to hold these against.
     ``ambient_measured`` (by window's first frame) is in which share of the picture ambient light could be measured
-    without a dark slot; ``in_shadow`` which share of a lamp's light is left where it cannot reach.
+    without a dark slot.
     ``dark_evenness`` is, round by round, ambient light where it is dim beside that where it is bright; 0 where the
     lights' own pictures are even, for then nothing shows what it falls on.
     ``first`` is the number of the clip's first round.
-    ``noises`` are how far the subject's light stands out of the plates' noise.
+    ``closely`` is what closer looks found, in rounds 1, 2, 4, 8 and so on, and ``light_at_points`` what lit
+    the points then.
     ``turn`` is how frames, which lie as the sensor read them, were turned to stand upright, as plates do.
-    ``stills`` says that the pictures of a round are photographs, each under its own light; ``astray`` is by how far
-    they lie apart.
+    ``stills`` says that the pictures of a round are photographs, each under its own light.
     ``motion`` is what moves between the plates of one light, as they pass.
     """
 
@@ -82,14 +78,7 @@ class Observed:
     turn: Turn = UPRIGHT
     facts: KeptFacts = field(default_factory=KeptFacts)
     counts: dict[str, Integers] = field(default_factory=dict)
-    blurs_px: list[float] = field(default_factory=list)
-    noises: list[AgainstNoise] = field(default_factory=list)
-    slopes: list[float] = field(default_factory=list)
-    away: list[float] = field(default_factory=list)
-    outward: list[float] = field(default_factory=list)
-    leans: list[Lean] = field(default_factory=list)
-    in_shadow: list[float] = field(default_factory=list)
-    astray: list[Astray] = field(default_factory=list)
+    closely: CloseLooks = field(default_factory=CloseLooks)
     light_at_points: list[PointLight] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: "array[float]" = field(default_factory=_numbers)
@@ -171,14 +160,7 @@ class Observed:
         self.facts.extend(other.facts)
         for light, counted in other.counts.items():
             self.counts[light] = self.counts.get(light, np.zeros(BINS + 2, np.int64)) + counted
-        self.blurs_px += other.blurs_px
-        self.noises += other.noises
-        self.slopes += other.slopes
-        self.away += other.away
-        self.outward += other.outward
-        self.leans += other.leans
-        self.in_shadow += other.in_shadow
-        self.astray += other.astray
+        self.closely.followed_by(other.closely)
         self.light_at_points += other.light_at_points
         self.ambient_measured |= other.ambient_measured
         self.beyond_mask += other.beyond_mask
@@ -220,44 +202,18 @@ class Observed:
         return self.worst.thumbnails
 
     def _looking_closely(self, one: Round, surface: Surface | None, some: Surface | None, seen: Seen) -> Iterator[None]:
-        yield
-        watched = next((plate for plate in one.plates if plate.light == self.motion.watched), one.plates[0])
-        blur_px = sharpest_blur_px(middle_of(watched.picture))
-        if blur_px is not None:
-            self.blurs_px.append(blur_px)
-        yield
-        noise = against_noise(one, seen)
-        if noise is not None:
-            self.noises.append(noise)
+        points = self.points if one.lights == self.lights else None
+        yield from self.closely.look_at_plates(one, seen, watched=self.motion.watched)
         yield
         if surface is not None:
-            small = self.look_at_slopes(surface, some)
+            yield from self.closely.look_at_surface(surface, some, seen, lights=len(self.lights), lens=self.lens)
             yield
-            found = lean(small, lens=self.lens)
-            if found is not None:
-                self.leans.append(found)
-            self.look_at_outline(thin_surface(surface) if some is None else some, seen)
-            yield
-            self._look_into_shadow(one, surface, seen)
-        if self.points is not None and one.lights == self.lights:
-            self.light_at_points.append(self.points.light(one))
+            if points is not None:
+                self.closely.look_into_shadow(surface, seen, points)
+        if points is not None:
+            self.light_at_points.append(points.light(one))
             if self.stills and one.number == self.first and seen.subject.any():
-                self._look_at_places(one, seen, self.points)
-
-    def look_at_slopes(self, surface: Surface, some: Surface | None = None) -> Averaged:
-        """Look whether normals are those of one surface, which faces the camera; return them coarsely. ``some`` is the
-        surface, thinned."""
-        small = coarse_normals(surface)
-        agreement = surface_agreement(surface, small, lights=len(self.lights))
-        if agreement is not None:
-            self.slopes.append(agreement)
-        self.away.append(share_away(surface, some))
-        return small
-
-    def look_at_outline(self, some: Surface, seen: Seen) -> None:
-        """Look whether normals face outwards where the subject ends; ``some`` is the surface, thinned."""
-        faces = outward(some, seen.subject, seen.bright.max(axis=0))
-        self.outward += [] if faces is None else [faces]
+                self._look_at_places(one, seen, points)
 
     def _look_at_places(self, one: Round, seen: Seen, points: RigPoints) -> None:
         shape = one.plates[0].shape[:2]
@@ -268,15 +224,7 @@ class Observed:
             for (first, last), size in zip(ends, shape, strict=True)
         )
         found = astray(one.plates, points, (down, across))
-        self.astray += [] if found is None else [found]
-
-    def _look_into_shadow(self, one: Round, surface: Surface, seen: Seen) -> None:
-        if self.points is None or one.lights != self.lights or len(self.points.vectors) > 1:
-            return
-        step, ways = step_of(*surface.valid.shape), self.points.vectors[0]
-        found = shadow_light(seen.bright, seen.shown, surface, ways, step=step)
-        if found is not None:
-            self.in_shadow.append(found)
+        self.closely.astray += [] if found is None else [found]
 
     def _change(self, surface: Surface | None, some: Surface | None) -> Change | None:
         before, self._sample = self._sample, None if surface is None else sample_of(surface, some)

@@ -17,13 +17,11 @@ from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.surface import Reflectance, Subject
 from psvideo.model.timing import Timing
-from psvideo.report.observe.against_noise import AgainstNoise
-from psvideo.report.observe.alignment.astray import Astray
+from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import PointLight
-from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.runs.instants.job import Found
 
@@ -33,9 +31,7 @@ TIMING, SUBJECT = "timing.json", "subject.json"
 BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
-ASTRAY = TypeAdapter(tuple[Astray, ...])
-NOISES = TypeAdapter(tuple[AgainstNoise, ...])
-LEANS = TypeAdapter(tuple[Lean, ...])
+CLOSE_LOOKS = TypeAdapter(CloseLooks)
 
 
 def write_notes(folder: Path, numbers: range, found: Found) -> None:
@@ -46,14 +42,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "first": seen.first,
         "facts": [asdict(one) for one in seen.facts],
         "counts": {light: counted.tolist() for light, counted in seen.counts.items()},
-        "blurs_px": seen.blurs_px,
-        "noises": [asdict(one) for one in seen.noises],
-        "slopes": seen.slopes,
-        "away": seen.away,
-        "outward": seen.outward,
-        "leans": [asdict(one) for one in seen.leans],
-        "in_shadow": seen.in_shadow,
-        "astray": [asdict(one) for one in seen.astray],
+        "closely": asdict(seen.closely),
         "ambient_measured": list(seen.ambient_measured.items()),
         "beyond_mask": seen.beyond_mask.tolist(),
         "dark_evenness": seen.dark_evenness.tolist(),
@@ -132,15 +121,8 @@ def _read(path: Path) -> tuple[range, Found]:
             first=record["first"],
             facts=KeptFacts(FACTS.validate_python(record["facts"])),
             counts={light: np.array(counted, np.int64) for light, counted in record["counts"].items()},
-            blurs_px=record["blurs_px"],
-            noises=list(NOISES.validate_python(record["noises"])),
-            slopes=record["slopes"],
-            away=record["away"],
-            outward=record["outward"],
-            leans=list(LEANS.validate_python(record["leans"])),
+            closely=CLOSE_LOOKS.validate_python(record["closely"]),
             light_at_points=[PointLight(arrays[f"light{n}"], arrays[f"white{n}"]) for n in range(len(lights))],
-            in_shadow=record["in_shadow"],
-            astray=list(ASTRAY.validate_python(record["astray"])),
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},
             beyond_mask=array("d", record["beyond_mask"]),
             dark_evenness=array("d", record["dark_evenness"]),
