@@ -136,9 +136,9 @@ def test_raw_picture_is_found_behind_a_thumbnail(tmp_path: Path) -> None:
     assert picture.header.cfa == "BGGR"
 
 
+@pytest.mark.parametrize("black", [np.array([[100, 300], [200, 400]]), np.full((2, 2), 100)], ids=["own", "alike"])
 @pytest.mark.parametrize("kind", [np.uint16, np.float16, np.float32])
-def test_every_place_of_a_mosaic_has_its_own_black(tmp_path: Path, kind: type) -> None:
-    black = np.array([[100, 300], [200, 400]])
+def test_every_place_of_a_mosaic_has_its_own_black(tmp_path: Path, kind: type, black: NDArray[np.int64]) -> None:
     codes: NDArray[Any] = np.random.default_rng(1).integers(500, 2000, (16, 24)).astype(kind)
     tags: list[Tag] = [(50713, "H", 2, (2, 2), True), (50714, "H", 4, tuple(map(int, black.ravel())), True)]
     write_dng(tmp_path / "x.dng", codes, [*tags, (50717, "H", 1, 4000, True)])

@@ -35,8 +35,9 @@ def in_codes(picture: CodedPicture | PictureInFile, encoding: Encoding) -> Coded
         return Coded(
             codes=codes, tone=_tone(_scale(head, encoding), encoding.transfer, black, white, codes.dtype.itemsize)
         )
-    if codes.dtype == np.float16 and (black is None or len({level for row in black for level in row}) == 1):
-        return Coded(codes=codes.view(np.uint16), tone=_half_tone(encoding.transfer, black, white))
+    alike = {level for row in black for level in row} if black else {None}
+    if codes.dtype == np.float16 and len(alike) == 1:
+        return Coded(codes=codes.view(np.uint16), tone=_half_tone(encoding.transfer, alike.pop(), white))
     if black is None and white is None and not find_curve(encoding.transfer).source:
         return Coded(codes=codes if codes.dtype == np.float32 else np.asarray(codes, np.float32), tone=IDENTITY)
     return Coded(codes=_float_light(np.asarray(codes), encoding.transfer, black, white))
@@ -62,11 +63,12 @@ def _tone(scale: "Scale", transfer: str, black: Levels | None, white: float | No
 
 
 @functools.lru_cache(maxsize=4)
-def _half_tone(transfer: str, black: Levels | None, white: float | None) -> Tone:
+def _half_tone(transfer: str, black: float | None, white: float | None) -> Tone:
     values = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32)
     as_they_are = black is None and white is None and not find_curve(transfer).source
     with np.errstate(invalid="ignore"):  # among all halves there are those that are no number
-        return Tone(table=_float_light(values, transfer, black, white), halves=as_they_are)
+        levels = None if black is None else ((black,),)
+        return Tone(table=_float_light(values, transfer, levels, white), halves=as_they_are)
 
 
 @dataclass(frozen=True, kw_only=True)
