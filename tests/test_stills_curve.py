@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+import tifffile
 from numpy.typing import NDArray
 from PIL import ExifTags, Image, ImageCms
 from still_pictures import (
@@ -192,6 +193,26 @@ def test_what_a_file_says_of_itself_is_read(tmp_path: Path) -> None:
     assert told.camera == "Canon EOS 5D"
     assert told.focal_widths == pytest.approx(50 / 36)
     assert stated_by(tmp_path / "missing.jpg").transfer is None
+
+
+def test_what_a_file_says_is_read_also_where_pillow_cannot_open_it(tmp_path: Path) -> None:
+    """Grey with alpha in 16 bits was read as linear whatever its profile said."""
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    said = [(34675, "B", len(profile), profile, True), (274, "H", 1, 6, True), (33434, "2I", 1, (1, 50), True)]
+    codes = np.zeros((8, 12, 2), np.uint16)
+    tifffile.imwrite(tmp_path / "a.tif", codes, photometric="minisblack", extrasamples=["unassalpha"], extratags=said)
+    told = stated_by(tmp_path / "a.tif")
+    assert (told.transfer, told.turn, told.exposure, told.longer_px) == ("srgb", EXIF[6], 0.02, 12)
+
+
+def test_a_lens_is_as_long_as_the_picture_and_not_the_small_one_before_it(tmp_path: Path) -> None:
+    """Pictures of chrome balls in TIFF and DNG with a preview were seen through a lens of its few pixels."""
+    with tifffile.TiffWriter(tmp_path / "a.dng") as file:
+        lens = [(0xA405, "H", 1, 72, True)]
+        file.write(np.zeros((16, 24, 3), np.uint8), photometric="rgb", subifds=1, subfiletype=1, extratags=lens)
+        filters = [(33421, "H", 2, (2, 2), True), (33422, "B", 4, (0, 1, 1, 2), True)]
+        file.write(np.full((64, 96), 500, np.uint16), photometric=32803, extratags=filters)
+    assert stated_by(tmp_path / "a.dng").focal_px == 192.0
 
 
 def test_a_profile_that_is_damaged_takes_neither_orientation_nor_exposure_with_it(tmp_path: Path) -> None:

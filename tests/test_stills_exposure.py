@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 from still_pictures import (
     LIGHTS,
@@ -57,6 +58,22 @@ def test_exposures_of_exif_are_believed_where_the_pictures_agree_and_not_where_t
     lies = ps.stills(with_exposures(tmp_path / "lies", pictures, seconds), lights=lights, out=tmp_path / "other")
     assert any("EXIF was not believed" in warning for warning in lies.warnings)
     assert error_deg(tmp_path / "other") < 1.5
+
+
+def test_exposures_are_read_of_dngs_that_hold_nothing_but_raw_samples(tmp_path: Path) -> None:
+    """Without a small picture before them Pillow opens no such file, and brackets were 39 degrees off."""
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for place, (name, picture) in enumerate(zip(NAMES, lit(), strict=True)):
+        filters = [(33421, "H", 2, (2, 2), True), (33422, "B", 4, (0, 1, 1, 2), True)]
+        levels = [(50714, "I", 1, 200, True), (50717, "I", 1, 15000, True)]
+        taken = [(33434, "2I", 1, (1, 50 * 2**place), True), (33437, "2I", 1, (8, 1), True), (34855, "H", 1, 100, True)]
+        tags = [(50706, "B", 4, (1, 4, 0, 0), True), (50708, "s", 0, "Test Camera", True), *filters, *levels, *taken]
+        codes = (200 + 14800 * picture / 2**place).astype(np.uint16)
+        tifffile.imwrite(folder / f"{name}.dng", codes, photometric=32803, extratags=tags)
+    report = ps.stills(folder, lights=listed(tmp_path / "l.lp"), out=tmp_path / "out")
+    assert "and the pictures agree: their lights' strengths were scaled" in remarks(report)
+    assert error_deg(tmp_path / "out") < 1.5
 
 
 @pytest.mark.parametrize(

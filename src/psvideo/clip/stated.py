@@ -1,7 +1,7 @@
 """What a photograph's file says of itself beside its pixels: how it was exposed, how it lies, and its colour's curve.
 
-EXIF (CIPA DC-008) is read from JPEG, TIFF and PNG; the curve from an ICC profile (ICC.1, the red or grey channel's
-``TRC``) or from PNG's own chunks (``cICP``, ``sRGB``, ``gAMA``).
+EXIF (CIPA DC-008) is read from JPEG, TIFF, PNG, DNG and raw files; the curve from an ICC profile (ICC.1, the red or
+grey channel's ``TRC``) or from PNG's own chunks (``cICP``, ``sRGB``, ``gAMA``).
 """
 
 import contextlib
@@ -14,9 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import ExifTags, Image
+from PIL import ExifTags, Image, UnidentifiedImageError
 
+from psvideo.clip.decode.decoders import read_header
+from psvideo.clip.folder import KINDS
 from psvideo.clip.transfer import BY_H273, DISPLAYED, find_curve, to_light
+from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 from psvideo.model.arrays import Doubles
 from psvideo.model.turn import EXIF, UPRIGHT, Turn
@@ -27,6 +30,8 @@ WIDTH_35_MM = 36.0
 OTHER_EXPOSURE = 1.05
 """Exposures that differ by this factor were not meant to be the same."""
 SIGNALS = np.linspace(0, 1, 65)
+SEVERAL_PICTURES = ("tiff", "dng", "raw")
+"""Kinds whose files may hold a small picture before the one that is decoded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,20 +66,53 @@ def stated_by(path: Path) -> Stated:
     with contextlib.suppress(Exception), warnings.catch_warnings():  # Pillow may raise anything over damaged tags
         warnings.simplefilter("ignore")  # of tags that are damaged: what they say is left out
         check_file(path)
-        with Image.open(path) as picture:
-            found = replace(found, longer_px=max(picture.size))
-            with contextlib.suppress(Exception):
-                transfer, by = _coded_curve(path) or _curve(picture.info)
-                found = replace(found, transfer=transfer, by=by)
-            exif = picture.getexif()
-            found = replace(found, turn=EXIF.get(int(_above_0(exif.get(ExifTags.Base.Orientation)) or 1), UPRIGHT))
-            taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+        longer_px, info, exif = _opened(path)
+        found = replace(found, longer_px=longer_px)
+        with contextlib.suppress(Exception):
+            transfer, by = _coded_curve(path) or _curve(info)
+            found = replace(found, transfer=transfer, by=by)
+        found = replace(found, turn=EXIF.get(int(_above_0(exif.get(ExifTags.Base.Orientation)) or 1), UPRIGHT))
         found = replace(
             found,
-            **_exposure(taken),
-            focal_widths=_above_0(taken.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
-            camera=_camera(taken),
+            **_exposure(exif),
+            focal_widths=_above_0(exif.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
+            camera=_camera(exif),
         )
+    return found if found.exposure is not None else _exposed_by_libraw(path, found)
+
+
+def _opened(path: Path) -> tuple[int, dict[Any, Any], dict[int, Any]]:
+    """Return the picture's longer side in pixels, what Pillow says of its colour, and all tags of its EXIF."""
+    try:
+        with Image.open(path) as picture:
+            exif = picture.getexif()
+            longer_px = _longer_px(path) or max(picture.size)
+            return longer_px, picture.info, {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+    except UnidentifiedImageError:  # samples that Pillow has no mode for, in a file that begins as TIFFs do
+        exif = Image.Exif()
+        with path.open("rb") as file:
+            exif.load_from_fp(file)
+            tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+        return _longer_px(path), {"icc_profile": tags.get(ExifTags.Base.InterColorProfile)}, tags
+
+
+def _longer_px(path: Path) -> int:
+    """Return the longer side of the picture that is decoded, where a file may hold a small one before it; else 0."""
+    kind = KINDS.get(path.suffix.lower())
+    if kind not in SEVERAL_PICTURES:
+        return 0
+    head = read_header(kind, path)
+    return max(head.width_px, head.height_px)
+
+
+def _exposed_by_libraw(path: Path, found: Stated) -> Stated:
+    """Return what was found with the exposure of a raw file whose EXIF only LibRaw finds."""
+    if KINDS.get(path.suffix.lower()) != "raw":
+        return found
+    from psvideo.clip.decode import raw  # loads LibRaw
+
+    with contextlib.suppress(PsvideoError, OSError):
+        found = replace(found, exposure=raw.relative_exposure(path), exposed_by=("time", "aperture", "ISO"))
     return found
 
 

@@ -97,8 +97,7 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
             f"{first}: is a picture of {width_px} x {height_px} pixels. Expected {LEAST_SIDE_PX} or more on every "
             "side: name the photographs themselves."
         )
-    longer_px = max(width_px, height_px)  # of raw files EXIF is read beside a small picture
-    stated = tuple(replace(_stated(kind, file), longer_px=longer_px) for file in files)
+    stated = tuple(stated_by(file) for file in files)
     _refuse_odd(files, [looks(header) for header in headers], "is")
     _refuse_odd(files, [str(one.turn) for one in stated], "lies")
     name, because = (transfer, "as you say") if transfer else curve_of_pictures(files, kind, headers[0], stated)
@@ -141,16 +140,6 @@ def _highest(codes: NDArray[Any], percent: float) -> float:
     """Return a percentile of the samples that are numbers, 0 where none is."""
     numbers = codes[np.isfinite(codes)].astype(np.float32)  # between halves a percentile overflows
     return float(np.percentile(numbers, percent)) if numbers.size else 0.0
-
-
-def _stated(kind: str, file: Path) -> Stated:
-    """Return what a photograph says; of raw files whose EXIF only LibRaw finds, the exposure as it reads it."""
-    said = stated_by(file)
-    if kind != "raw" or said.exposure is not None:
-        return said
-    from psvideo.clip.decode import raw  # loads LibRaw
-
-    return replace(said, exposure=raw.relative_exposure(file), exposed_by=("time", "aperture", "ISO"))
 
 
 def _refuse_odd(files: Sequence[Path], facts: Sequence[str], verb: str) -> None:
