@@ -1,14 +1,14 @@
 """Judgements on rows and frames: rows that nobody saw, or under two flashes, and frames that are missing or repeat."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from psvideo.model.cost.in_step import IN_STEP, blind_share, dark_s_out_of_step, frames_in_step, never_shown
 from psvideo.model.cost.shoot_figures import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import counted, listed
-from psvideo.report.judgement import Judgement
+from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import Observed
 
 MIXED, LOST_MIXED = 0.02, 0.2
@@ -23,52 +23,82 @@ NAMED = 3
 """At most this many places of missing frames are named."""
 
 
+@dataclass(frozen=True)
+class _Rows:
+    """Shares of a round's rows: at most so many were ``unseen``, at most so many ``borrowed`` from other rounds.
+
+    ``rounds`` are what each round of a whole take lacks, empty where only its start was looked at. ``show_ambient``
+    says that ambient light, too, is known only where rows saw a part of a flash: there is no dark slot.
+    """
+
+    unseen: float
+    borrowed: float
+    rounds: tuple[float, ...]
+    show_ambient: bool
+
+
 def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | None = None) -> Iterator[Judgement]:
     """Judge which rows were seen by nobody, or under two flashes, and why. ``take_s`` is how long the take lasts of
     which only a part was looked at: the rest shows more rows below 360 degrees, and shows the ambient light of rows
     where there is no dark slot."""
-    unseen = max((one.unseen_share for one in observed.facts), default=0.0)
-    borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
-    if take_s is not None and unseen > MOST_UNSEEN and _is_blind(timing) and not in_step(plan, timing):
-        never = never_shown(_as_found(plan, timing), lasts_s=take_s, clock_offset_ppm=timing.clock_offset_ppm)
-        unseen, borrowed = min(unseen, never), min(borrowed + unseen, 1.0)
-    rounds = [one.unseen_share for one in observed.facts] if take_s is None else []
-    without_dark = not (plan.mode == "synced" or _is_blind(timing) or any(flash.is_dark for flash in plan.flashes))
-    if take_s is not None and without_dark:
-        unseen = 0.0  # more frames show the ambient light of more rows
-    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed, rounds)]
-    holes = list(_dropped(timing, observed, alone=not (without_dark or _is_blind(timing))))
-    lost = sum(one.unseen_share > MOST_UNSEEN for one in observed.facts)
-    by_holes = bool(timing.dropped_frames) and (unseen <= LOST_UNSEEN or _few(lost, len(observed.facts)))
-    explained = bool(said) or by_holes  # else it takes a line of its own
-    if unseen > MOST_UNSEEN and not explained and without_dark:
-        said.append(
-            Judgement(
-                subject="rows",
-                grade="bad" if unseen > LOST_UNSEEN else "doubtful",
-                found=f"In up to {100 * unseen:.0f} % of a round's rows ambient light is not known: without a dark "
-                "slot it is found from rows that saw a part of a flash, and these saw whole flashes only.",
-                advice="Film longer, or add a dark slot to the plan.",
-            )
-        )
-    elif unseen > MOST_UNSEEN and not explained:
-        said.append(
-            Judgement(
-                subject="rows",
-                grade="bad" if unseen > LOST_UNSEEN else "doubtful",
-                found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame.",
-                advice="See the line on missing frames first."
-                if timing.dropped_frames
-                else "Use all frames (no steps in `frames`), and shoot at 360 degrees.",
-            )
-        )
+    rows = _rows_of(plan, timing, observed, take_s)
+    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, rows)]
+    holes = list(_dropped(timing, observed, alone=not (rows.show_ambient or _is_blind(timing))))
+    if rows.unseen > MOST_UNSEEN and not said and not _lost_in_holes(timing, observed, rows):
+        said.append(_unexplained(timing, rows))
     yield from said
     yield from holes
     if not said and not holes:
         seen = (
-            "Every row of every round was seen" if not unseen else f"All but {100 * unseen:.2g} % of the rows were seen"
+            f"All but {100 * rows.unseen:.2g} % of the rows were seen"
+            if rows.unseen
+            else "Every row of every round was seen"
         )
         yield Judgement(subject="rows", grade="good", found=f"{seen}; no frame is missing.")
+
+
+def _rows_of(plan: Plan, timing: Timing, observed: Observed, take_s: float | None) -> _Rows:
+    """Return what rounds lack; of a take that lasts ``take_s`` and is only begun, what they will lack at its end."""
+    unseen = max((one.unseen_share for one in observed.facts), default=0.0)
+    borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
+    blind = _is_blind(timing)
+    show_ambient = plan.mode != "synced" and not blind and not any(flash.is_dark for flash in plan.flashes)
+    if take_s is None:
+        return _Rows(unseen, borrowed, tuple(one.unseen_share for one in observed.facts), show_ambient)
+    if unseen > MOST_UNSEEN and blind and not in_step(plan, timing):
+        never = never_shown(_as_found(plan, timing), lasts_s=take_s, clock_offset_ppm=timing.clock_offset_ppm)
+        unseen, borrowed = min(unseen, never), min(borrowed + unseen, 1.0)
+    if show_ambient:
+        unseen = 0.0  # more frames show the ambient light of more rows
+    return _Rows(unseen, borrowed, (), show_ambient)
+
+
+def _lost_in_holes(timing: Timing, observed: Observed, rows: _Rows) -> bool:
+    """Return whether missing frames, which have a line of their own, are all that rows lack for."""
+    lost = sum(one.unseen_share > MOST_UNSEEN for one in observed.facts)
+    return bool(timing.dropped_frames) and (rows.unseen <= LOST_UNSEEN or _few(lost, len(observed.facts)))
+
+
+def _unexplained(timing: Timing, rows: _Rows) -> Judgement:
+    share = f"{100 * rows.unseen:.0f} % of a round's rows"
+    if rows.show_ambient:
+        found = (
+            f"In up to {share} ambient light is not known: without a dark slot it is found from rows that saw a part "
+            "of a flash, and these saw whole flashes only."
+        )
+        advice = "Film longer, or add a dark slot to the plan."
+    else:
+        found = f"Up to {share} were seen by no frame."
+        advice = (
+            "See the line on missing frames first."
+            if timing.dropped_frames
+            else "Use all frames (no steps in `frames`), and shoot at 360 degrees."
+        )
+    return Judgement(subject="rows", grade=_grade(rows.unseen), found=found, advice=advice)
+
+
+def _grade(unseen: float) -> Grade:
+    return "bad" if unseen > LOST_UNSEEN else "doubtful"
 
 
 def _few(spoilt: int, rounds: int) -> bool:
@@ -105,9 +135,10 @@ def in_step(plan: Plan, timing: Timing) -> bool:
     return _is_blind(timing) and never_shown(found, clock_offset_ppm=timing.clock_offset_ppm) > IN_STEP
 
 
-def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float, rounds: Sequence[float]) -> Iterator[Judgement]:
-    """Judge a shutter that is closed for a part of the time. ``rounds`` are the shares of rows that each round of a
-    whole take lacks: at its two ends few others show them, and the rest serves."""
+def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
+    """Judge a shutter that is closed for a part of the time. At a whole take's two ends few other rounds show the rows
+    that one lacks, and the rest serves."""
+    unseen, borrowed, rounds = rows.unseen, rows.borrowed, rows.rounds
     serves = unseen <= LOST_UNSEEN or _few(sum(one > LOST_UNSEEN for one in rounds), len(rounds))
     if not _is_blind(timing):
         return
@@ -116,7 +147,7 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float, rounds: S
         other_s = dark_s_out_of_step(_as_found(plan, timing))
         yield Judgement(
             subject="rows",
-            grade="bad" if unseen > LOST_UNSEEN else "doubtful",
+            grade=_grade(unseen),
             found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {opened}, and the strobe "
             f"keeps step with the frames, so that every {frames_in_step(plan)} frames its flashes meet the same rows.",
             advice="Shoot at 360 degrees"
@@ -136,7 +167,7 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float, rounds: S
     elif unseen > MOST_UNSEEN:
         yield Judgement(
             subject="rows",
-            grade="bad" if unseen > LOST_UNSEEN else "doubtful",
+            grade=_grade(unseen),
             found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: {opened}.",
             advice="Shoot at 360 degrees.",
         )
