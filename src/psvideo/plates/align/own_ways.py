@@ -71,8 +71,14 @@ class _Side:
 
 @dataclass(frozen=True, kw_only=True)
 class _Layers:
-    """A ``plate`` that fades between two ``sides``, by what each ``counts``; which share of it lies ``behind`` what
-    stands, the ``ways`` of that, and what each ``shares`` in it, all as flow has them."""
+    """A ``plate`` at an instant, which is so far the fade of its two ``sides``, and what replaces that fade.
+
+    What is shown is: plate + sum over ways of share x (fade of both sides moved along the way - fade of both sides).
+
+    ``counts`` are the sides' weights in a fade, 1 together. The others have flow's resolution, below the plate's:
+    ``behind`` (row, col) is which share of a pixel is not hidden by what stands before it, ``ways`` are velocities
+    (2, row, col) in its pixels a second, and ``shares`` (row, col), one for each way, what the way counts.
+    """
 
     plate: LightPlate
     sides: tuple[_Side, ...]
