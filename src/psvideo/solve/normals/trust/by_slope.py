@@ -11,8 +11,6 @@ with the slope by chance. By how much albedo goes with the slope, and how the li
 and across it, says by how much normals are turned.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,22 +18,21 @@ from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.by_colour import spread_across_and_along
-from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
+from psvideo.solve.normals.trust.slope_pairs import (
+    LEAST_PAIRS,
+    TYPICAL_OF_MEDIAN,
+    SlopePairs,
+    averaged,
+    in_light_of_all,
+    of_place,
+    pairs_of,
+    robustly,
+    solved,
+)
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
-AVERAGED = 5
-"""Normals and albedo are means over squares of so many points, and neighbours are so far apart: what noise does to both
-at once would pass for albedo that goes with the slope."""
-MOST_PAIRS, LEAST_PAIRS = 2500, 300
-"""So many pairs are fitted, evenly over the subject, and at least the second number."""
-IN_LIGHT, LEAST_BRIGHT = 0.2, 0.05
-"""A point speaks where every light shines on it by at least this share of the mean, and where it is not darker than the
-second share of what is typical: in shadow there is no albedo."""
-EVEN = 2.0
-"""Squares in which albedo varies by more than so many times what is typical hold an edge of paint, and do not speak."""
 POWERS = (30.0, 120.0)
 """Highlights half way between a light and the camera are so narrow, as powers of the cosine."""
-TURNS, RIDGE = 5, 1e-4
-"""Cauchy's weights are found in so many turns; numbers that hardly show stay near 0."""
 SQUARES = 0.15
 """The chess board's squares have this share of the subject's size."""
 MOST_OUTLYING = 3.0
@@ -46,21 +43,9 @@ SURE = 3.0
 """Of light that all lamps add counts what is more than so many standard errors."""
 OF_NOISE = 0.15
 """By so much of what noise does to normals of a matte ball their albedo goes with the slope all the same."""
-TYPICAL_OF_MEDIAN = 1.48
 TURNS_MORE, LARGEST_DEG = 1.5, 30.0
 """Normals are turned by so many times what albedo shows of it, since a part of it shows in no length; what that says by
 as many degrees as the second number counts half, and nothing counts more: such lengths are a highlight's."""
-
-
-class _Pairs(NamedTuple):
-    """Neighbours: how the logarithm of albedo differs (pair,), the normals of the first and of the other (pair, 3), and
-    where these are, in rows and columns over the subject's size (pair, 2)."""
-
-    differs: Doubles
-    here: Doubles
-    there: Doubles
-    place: Doubles
-    other: Doubles
 
 
 def by_slope_deg(
@@ -70,9 +55,9 @@ def by_slope_deg(
     the points, of which these ``known`` speak for the subject; zeros where too few of them are in the light of all
     lamps. By so much of itself counts what turns normals, and light that every lamp adds alike, where that is more:
     ``unseen`` and ``alike_unseen`` by residuals (``unchecked.py``)."""
-    normals, albedo, whole = _averaged(points, known)
-    bright = _bright(normals, albedo, lit, whole)
-    pairs = _pairs_of(normals, albedo, bright)
+    normals, albedo, whole = averaged(points, known)
+    bright = in_light_of_all(normals, albedo, lit, whole)
+    pairs = pairs_of(normals, albedo, bright)
     if pairs is None:
         return np.zeros(known.shape, np.float32)
     shown = np.zeros(known.shape, np.float32)
@@ -83,59 +68,6 @@ def by_slope_deg(
         shown = np.maximum(shown, np.float32(alike_unseen) * _turned_by_added_deg(points, lit, pairs))
     shown = np.sqrt(np.maximum(shown**2 - (np.float32(OF_NOISE) * points.noise_deg) ** 2, 0))
     return np.asarray(shown / (1 + shown / np.float32(LARGEST_DEG)), np.float32)
-
-
-def _averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
-    """Return normals (3, row, col) and albedo (row, col) of means over squares, and which squares are known as a whole
-    and hold no edge of paint."""
-    from psvideo.solve.normals.trust.by_slope_kernel import SUMMED, fill_averaged, fill_summed
-
-    given = np.ascontiguousarray(known).view(np.uint8).reshape(-1)
-    summed = np.empty((SUMMED, *known.shape), np.float32)
-    fill_summed(points.planes.reshape(3, -1), line(points.brightness), given, summed.reshape(SUMMED, -1))
-    means = blurred(summed, AVERAGED)
-    varies, whole = np.empty(known.shape, np.float32), np.empty(known.shape, np.bool_)
-    fill_averaged(means.reshape(SUMMED, -1), given, line(varies), whole.view(np.uint8).reshape(-1))
-    if whole.any():
-        whole &= varies <= np.float32(EVEN) * median(varies[whole])
-    return means[:3], means[3], whole
-
-
-def _pairs_of(normals: Floats, albedo: Floats, bright: Mask) -> _Pairs | None:
-    """Return neighbours in the light of all lamps, None where there are too few."""
-    cols = bright.shape[1]
-    over, beside = (np.flatnonzero(both) for both in _both(bright))
-    first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
-    if len(first) < LEAST_PAIRS:
-        return None
-    chosen = np.linspace(0, len(first) - 1, min(MOST_PAIRS, len(first))).astype(np.intp)
-    first, second = first[chosen], second[chosen]
-    ways = normals.reshape(3, -1)
-    here, there = (ways[:, at].T.astype(np.float64) for at in (first, second))
-    ones = np.log(albedo.reshape(-1)[np.stack([first, second])].astype(np.float64))
-    size = np.sqrt(np.count_nonzero(bright))
-    place, other = (np.stack(np.divmod(at, cols), axis=-1) / size for at in (first, second))
-    return _Pairs(differs=ones[1] - ones[0], here=here, there=there, place=place, other=other)
-
-
-def _bright(normals: Floats, albedo: Floats, lit: Illumination, known: Mask) -> Mask:
-    """Return where of what is ``known`` all lights shine on a surface that is not black, (row, col)."""
-    from psvideo.solve.normals.trust.by_slope_kernel import fill_in_light
-
-    in_light = np.empty(known.shape, np.bool_)
-    flags = (each.view(np.uint8).reshape(-1) for each in (known, in_light))
-    fill_in_light(normals.reshape(3, -1), lit.directions.astype(np.float32), IN_LIGHT, *flags)
-    if not in_light.any():
-        return in_light
-    return np.asarray(in_light & (albedo > LEAST_BRIGHT * median(albedo[in_light])))
-
-
-def _both(bright: Mask) -> tuple[Mask, Mask]:
-    """Return where a point and its neighbour below, and that to the right, are bright."""
-    below, beside = np.zeros_like(bright), np.zeros_like(bright)
-    below[:-AVERAGED] = bright[:-AVERAGED] & bright[AVERAGED:]
-    beside[:, :-AVERAGED] = bright[:, :-AVERAGED] & bright[:, AVERAGED:]
-    return below, beside
 
 
 def _functions(normals: Doubles, directions: NDArray[np.floating]) -> Doubles:
@@ -151,7 +83,7 @@ def _functions(normals: Doubles, directions: NDArray[np.floating]) -> Doubles:
     return np.concatenate([np.stack(smooth, axis=-1), *(shine**power for power in POWERS)], axis=1)
 
 
-def _goes_with_slope(pairs: _Pairs, lit: Illumination) -> float:
+def _goes_with_slope(pairs: SlopePairs, lit: Illumination) -> float:
     """Return by which share of itself albedo typically differs with the slope, as far as one half of the subject tells
     it of the other."""
     here, there = (_functions(normals, lit.directions) for normals in (pairs.here, pairs.there))
@@ -165,7 +97,7 @@ def _goes_with_slope(pairs: _Pairs, lit: Illumination) -> float:
     return float(np.hypot(typical, typical_of_place) * np.sqrt(told))
 
 
-def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: _Pairs) -> Floats:
+def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: SlopePairs) -> Floats:
     """Return by how many degrees light turns every normal that all lamps add alike, (row, col): as much of it as makes
     albedo differ as it does. Lamps at one angle to an axis take such light for a vector along it, which stretches
     normals that lean to it, and turns those that do not."""
@@ -176,14 +108,14 @@ def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: _Pairs) 
     return np.asarray(np.degrees(np.float32(much)) * across, np.float32)
 
 
-def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
+def _fitted(pairs: SlopePairs, changes: Doubles) -> tuple[Doubles, float]:
     """Return by how much each function counts in how albedo differs, and which share of what they explain functions
     of one half of the subject explain of the other."""
-    numbers, weights = _robustly(changes, pairs.differs)
+    numbers, weights = robustly(changes, pairs.differs)
     black = (pairs.place / SQUARES).astype(np.intp).sum(axis=1) % 2 == 0
     by_other = np.empty_like(weights)
     for one in (black, ~black):
-        by_other[~one] = changes[~one] @ _solved(changes[one], pairs.differs[one], weights[one])
+        by_other[~one] = changes[~one] @ solved(changes[one], pairs.differs[one], weights[one])
     whole = changes @ numbers
     most = MOST_OUTLYING * float(np.sqrt((whole**2).mean()))
     explained = _explained(pairs.differs, whole, weights)
@@ -191,17 +123,17 @@ def _fitted(pairs: _Pairs, changes: Doubles) -> tuple[Doubles, float]:
     return numbers, min(told / explained, 1.0) if explained > 0 else 0.0
 
 
-def _surely(pairs: _Pairs, stretches: Doubles) -> float:
+def _surely(pairs: SlopePairs, stretches: Doubles) -> float:
     """Return how many times by what ``stretches`` normals (pair,) albedo differs, less SURE standard errors: as the
     subject's quarters agree on it, each by what its place leaves of that. Paint in large soft blobs goes with the slope
     and the place of one quarter or another."""
-    moves = _of_place(pairs.other) - _of_place(pairs.place)
+    moves = of_place(pairs.other) - of_place(pairs.place)
     low, right = (pairs.place > np.median(pairs.place, axis=0)).T
     found = list[tuple[float, float]]()
     for one in (low & right, low & ~right, ~low & right, ~low & ~right):
         if np.count_nonzero(one) < LEAST_PAIRS / 8:
             return 0.0
-        numbers, weights = _robustly(np.concatenate([stretches[one, None], moves[one]], axis=1), pairs.differs[one])
+        numbers, weights = robustly(np.concatenate([stretches[one, None], moves[one]], axis=1), pairs.differs[one])
         root = np.sqrt(weights)
         weighed, own = moves[one] * root[:, None], stretches[one] * root
         left = own - weighed @ np.linalg.lstsq(weighed, own, rcond=None)[0]
@@ -213,27 +145,10 @@ def _surely(pairs: _Pairs, stretches: Doubles) -> float:
     return max(mean - SURE * float(error), 0.0)
 
 
-def _robustly(changes: Doubles, differs: Doubles) -> tuple[Doubles, Doubles]:
-    """Return by how much each function (pair, function) counts in how albedo differs, and every pair's weight."""
-    weights = np.ones(len(changes))
-    for _ in range(TURNS):
-        numbers = _solved(changes, differs, weights)
-        left = np.abs(differs - changes @ numbers)
-        weights = 1 / (1 + (left / (TYPICAL_OF_MEDIAN * median(left) + 1e-6)) ** 2)
-    return numbers, weights
-
-
 def _explained(differs: Doubles, by_slope: Doubles, weights: Doubles) -> float:
     """Return how much of squares is explained by as many times ``by_slope`` as explain most, 0 where less than none."""
     along = max(float((weights * differs * by_slope).sum()), 0.0)
     return along**2 / max(float((weights * by_slope**2).sum()), 1e-30)
-
-
-def _solved(changes: Doubles, differs: Doubles, weights: Doubles) -> Doubles:
-    weighed = changes * weights[:, None]
-    matrix = weighed.T @ changes
-    matrix.reshape(-1)[:: len(matrix) + 1] += RIDGE * max(float(matrix.trace()) / len(matrix), 1e-9)
-    return np.asarray(np.linalg.solve(matrix, weighed.T @ differs))
 
 
 def _about_median(values: Doubles) -> Doubles:
@@ -243,17 +158,11 @@ def _about_median(values: Doubles) -> Doubles:
 def _without_place(values: Doubles, place: Doubles) -> tuple[Doubles, Doubles]:
     """Return what is left without what goes with the place (point, 2), a polynomial of second order, and that."""
     place = place - place.mean(axis=0)
-    terms = np.concatenate([np.ones((len(place), 1)), _of_place(place)], axis=1)
+    terms = np.concatenate([np.ones((len(place), 1)), of_place(place)], axis=1)
     matrix = terms.T @ terms
     matrix[np.diag_indices(6)] += 1e-9 * len(place)
     smooth = terms @ np.linalg.solve(matrix, terms.T @ values)
     return np.asarray(values - smooth), _about_median(smooth)
-
-
-def _of_place(place: Doubles) -> Doubles:
-    """Return what a polynomial of second order of the place (point, 2) consists of beside what is everywhere alike."""
-    row, col = place.T
-    return np.stack([row, col, row * row, row * col, col * col], axis=-1)
 
 
 def _turned_beside_stretched(points: ThinSurface, lit: Illumination, known: Mask, bright: Mask) -> Floats:

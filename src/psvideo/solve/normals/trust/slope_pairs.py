@@ -1,0 +1,115 @@
+"""Neighbours in the light of all lamps: how their albedo differs, and how it goes with anything else.
+
+Edges of paint are outliers.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from psvideo.compute.ranks import median
+from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
+
+AVERAGED = 5
+"""Normals and albedo are means over squares of so many points, and neighbours are so far apart: what noise does to both
+at once would pass for albedo that goes with the slope."""
+MOST_PAIRS, LEAST_PAIRS = 2500, 300
+"""So many pairs are fitted, evenly over the subject, and at least the second number."""
+IN_LIGHT, LEAST_BRIGHT = 0.2, 0.05
+"""A point speaks where every light shines on it by at least this share of the mean, and where it is not darker than the
+second share of what is typical: in shadow there is no albedo."""
+EVEN = 2.0
+"""Squares in which albedo varies by more than so many times what is typical hold an edge of paint, and do not speak."""
+TURNS, RIDGE = 5, 1e-4
+"""Cauchy's weights are found in so many turns; numbers that hardly show stay near 0."""
+TYPICAL_OF_MEDIAN = 1.48
+
+
+class SlopePairs(NamedTuple):
+    """Neighbours: how the logarithm of albedo differs (pair,), the normals of the first and of the other (pair, 3), and
+    where these are, in rows and columns over the subject's size (pair, 2)."""
+
+    differs: Doubles
+    here: Doubles
+    there: Doubles
+    place: Doubles
+    other: Doubles
+
+
+def averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
+    """Return normals (3, row, col) and albedo (row, col) of means over squares, and which squares are known as a whole
+    and hold no edge of paint."""
+    from psvideo.solve.normals.trust.by_slope_kernel import SUMMED, fill_averaged, fill_summed
+
+    given = np.ascontiguousarray(known).view(np.uint8).reshape(-1)
+    summed = np.empty((SUMMED, *known.shape), np.float32)
+    fill_summed(points.planes.reshape(3, -1), line(points.brightness), given, summed.reshape(SUMMED, -1))
+    means = blurred(summed, AVERAGED)
+    varies, whole = np.empty(known.shape, np.float32), np.empty(known.shape, np.bool_)
+    fill_averaged(means.reshape(SUMMED, -1), given, line(varies), whole.view(np.uint8).reshape(-1))
+    if whole.any():
+        whole &= varies <= np.float32(EVEN) * median(varies[whole])
+    return means[:3], means[3], whole
+
+
+def pairs_of(normals: Floats, albedo: Floats, bright: Mask) -> SlopePairs | None:
+    """Return neighbours in the light of all lamps, None where there are too few."""
+    cols = bright.shape[1]
+    over, beside = (np.flatnonzero(both) for both in _both(bright))
+    first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
+    if len(first) < LEAST_PAIRS:
+        return None
+    chosen = np.linspace(0, len(first) - 1, min(MOST_PAIRS, len(first))).astype(np.intp)
+    first, second = first[chosen], second[chosen]
+    ways = normals.reshape(3, -1)
+    here, there = (ways[:, at].T.astype(np.float64) for at in (first, second))
+    ones = np.log(albedo.reshape(-1)[np.stack([first, second])].astype(np.float64))
+    size = np.sqrt(np.count_nonzero(bright))
+    place, other = (np.stack(np.divmod(at, cols), axis=-1) / size for at in (first, second))
+    return SlopePairs(differs=ones[1] - ones[0], here=here, there=there, place=place, other=other)
+
+
+def in_light_of_all(normals: Floats, albedo: Floats, lit: Illumination, known: Mask) -> Mask:
+    """Return where of what is ``known`` all lights shine on a surface that is not black, (row, col)."""
+    from psvideo.solve.normals.trust.by_slope_kernel import fill_in_light
+
+    in_light = np.empty(known.shape, np.bool_)
+    flags = (each.view(np.uint8).reshape(-1) for each in (known, in_light))
+    fill_in_light(normals.reshape(3, -1), lit.directions.astype(np.float32), IN_LIGHT, *flags)
+    if not in_light.any():
+        return in_light
+    return np.asarray(in_light & (albedo > LEAST_BRIGHT * median(albedo[in_light])))
+
+
+def _both(bright: Mask) -> tuple[Mask, Mask]:
+    """Return where a point and its neighbour below, and that to the right, are bright."""
+    below, beside = np.zeros_like(bright), np.zeros_like(bright)
+    below[:-AVERAGED] = bright[:-AVERAGED] & bright[AVERAGED:]
+    beside[:, :-AVERAGED] = bright[:, :-AVERAGED] & bright[:, AVERAGED:]
+    return below, beside
+
+
+def robustly(changes: Doubles, differs: Doubles) -> tuple[Doubles, Doubles]:
+    """Return by how much each function (pair, function) counts in how albedo differs, and every pair's weight."""
+    weights = np.ones(len(changes))
+    for _ in range(TURNS):
+        numbers = solved(changes, differs, weights)
+        left = np.abs(differs - changes @ numbers)
+        weights = 1 / (1 + (left / (TYPICAL_OF_MEDIAN * median(left) + 1e-6)) ** 2)
+    return numbers, weights
+
+
+def solved(changes: Doubles, differs: Doubles, weights: Doubles) -> Doubles:
+    """Return by how much each function (pair, function) counts in least squares of so many ``weights`` (pair,)."""
+    weighed = changes * weights[:, None]
+    matrix = weighed.T @ changes
+    matrix.reshape(-1)[:: len(matrix) + 1] += RIDGE * max(float(matrix.trace()) / len(matrix), 1e-9)
+    return np.asarray(np.linalg.solve(matrix, weighed.T @ differs))
+
+
+def of_place(place: Doubles) -> Doubles:
+    """Return what a polynomial of second order of the place (point, 2) consists of beside what is everywhere alike."""
+    row, col = place.T
+    return np.stack([row, col, row * row, row * col, col * col], axis=-1)
