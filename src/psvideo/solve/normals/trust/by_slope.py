@@ -11,15 +11,17 @@ with the slope by chance. By how much albedo goes with the slope, and how the li
 and across it, says by how much normals are turned.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.added_light import Added, turned_by_added_deg
 from psvideo.solve.normals.trust.by_colour import spread_across_and_along
 from psvideo.solve.normals.trust.slope_pairs import (
-    LEAST_PAIRS,
     TYPICAL_OF_MEDIAN,
     SlopePairs,
     averaged,
@@ -39,8 +41,6 @@ MOST_OUTLYING = 3.0
 """Where nothing was fitted, functions run away: beyond this many times their root mean square they count no more."""
 OF_PLACE = 0.5
 """What goes with the slope as it goes with the place may be a lens that darkens its corners: it counts by so much."""
-SURE = 3.0
-"""Of light that all lamps add counts what is more than so many standard errors."""
 OF_NOISE = 0.15
 """By so much of what noise does to normals of a matte ball their albedo goes with the slope all the same."""
 TURNS_MORE, LARGEST_DEG = 1.5, 30.0
@@ -49,12 +49,12 @@ as many degrees as the second number counts half, and nothing counts more: such 
 
 
 def by_slope_deg(
-    points: ThinSurface, lit: Illumination, known: Mask, *, unseen: float = 1.0, alike_unseen: float = 0.0
+    points: ThinSurface, lit: Illumination, known: Mask, *, unseen: float = 1.0, added: Sequence[Added] = ()
 ) -> Floats:
     """Return by how many degrees normals are turned, as far as albedo that goes with the slope shows it, (row, col) of
     the points, of which these ``known`` speak for the subject; zeros where too few of them are in the light of all
-    lamps. By so much of itself counts what turns normals, and light that every lamp adds alike, where that is more:
-    ``unseen`` and ``alike_unseen`` by residuals (``unchecked.py``)."""
+    lamps. What turns normals counts as far as residuals leave it ``unseen`` (``unchecked.py``), or light that all lamps
+    ``added`` alike (``added_light.py``), where that is more."""
     normals, albedo, whole = averaged(points, known)
     bright = in_light_of_all(normals, albedo, lit, whole)
     pairs = pairs_of(normals, albedo, bright)
@@ -64,8 +64,8 @@ def by_slope_deg(
     if unseen:
         typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs, lit)))
         shown = typical_deg * _turned_beside_stretched(points, lit, known, bright)
-    if alike_unseen:
-        shown = np.maximum(shown, np.float32(alike_unseen) * _turned_by_added_deg(points, lit, pairs))
+    if added:
+        shown = np.maximum(shown, turned_by_added_deg(points, pairs, added))
     shown = np.sqrt(np.maximum(shown**2 - (np.float32(OF_NOISE) * points.noise_deg) ** 2, 0))
     return np.asarray(shown / (1 + shown / np.float32(LARGEST_DEG)), np.float32)
 
@@ -97,17 +97,6 @@ def _goes_with_slope(pairs: SlopePairs, lit: Illumination) -> float:
     return float(np.hypot(typical, typical_of_place) * np.sqrt(told))
 
 
-def _turned_by_added_deg(points: ThinSurface, lit: Illumination, pairs: SlopePairs) -> Floats:
-    """Return by how many degrees light turns every normal that all lamps add alike, (row, col): as much of it as makes
-    albedo differ as it does. Lamps at one angle to an axis take such light for a vector along it, which stretches
-    normals that lean to it, and turns those that do not."""
-    added = np.linalg.pinv(lit.directions) @ np.ones(len(lit.directions))
-    much = _surely(pairs, (pairs.there - pairs.here) @ added)
-    along = np.tensordot(added.astype(np.float32), points.planes, axes=1)
-    across = np.sqrt(np.maximum(np.float32(added @ added) - along * along, np.float32(0)))
-    return np.asarray(np.degrees(np.float32(much)) * across, np.float32)
-
-
 def _fitted(pairs: SlopePairs, changes: Doubles) -> tuple[Doubles, float]:
     """Return by how much each function counts in how albedo differs, and which share of what they explain functions
     of one half of the subject explain of the other."""
@@ -121,28 +110,6 @@ def _fitted(pairs: SlopePairs, changes: Doubles) -> tuple[Doubles, float]:
     explained = _explained(pairs.differs, whole, weights)
     told = _explained(pairs.differs, np.clip(by_other, -most, most), weights)
     return numbers, min(told / explained, 1.0) if explained > 0 else 0.0
-
-
-def _surely(pairs: SlopePairs, stretches: Doubles) -> float:
-    """Return how many times by what ``stretches`` normals (pair,) albedo differs, less SURE standard errors: as the
-    subject's quarters agree on it, each by what its place leaves of that. Paint in large soft blobs goes with the slope
-    and the place of one quarter or another."""
-    moves = of_place(pairs.other) - of_place(pairs.place)
-    low, right = (pairs.place > np.median(pairs.place, axis=0)).T
-    found = list[tuple[float, float]]()
-    for one in (low & right, low & ~right, ~low & right, ~low & ~right):
-        if np.count_nonzero(one) < LEAST_PAIRS / 8:
-            return 0.0
-        numbers, weights = robustly(np.concatenate([stretches[one, None], moves[one]], axis=1), pairs.differs[one])
-        root = np.sqrt(weights)
-        weighed, own = moves[one] * root[:, None], stretches[one] * root
-        left = own - weighed @ np.linalg.lstsq(weighed, own, rcond=None)[0]
-        found.append((float(numbers[0]), float((left**2).sum())))
-    each, counts = np.array(found).T
-    counts /= max(float(counts.sum()), 1e-12)
-    mean = float((counts * each).sum())
-    error = np.sqrt(len(each) / (len(each) - 1) * ((counts * (each - mean)) ** 2).sum())
-    return max(mean - SURE * float(error), 0.0)
 
 
 def _explained(differs: Doubles, by_slope: Doubles, weights: Doubles) -> float:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.added_light import Added, added_unseen
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
@@ -28,7 +29,6 @@ from psvideo.solve.normals.trust.torn import torn_angles_deg
 from psvideo.solve.normals.trust.unchecked import (
     ALL_EXPLAINED,
     FEW_LIGHTS,
-    alike_unseen_share,
     torn_share,
     turned_unseen,
     unseen_share,
@@ -115,9 +115,9 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
-    unseen = alike = 0.0
+    unseen, added = 0.0, tuple[Added, ...]()
     if by_slope and not one.moved:  # what was not followed goes with it too
-        unseen, alike = unseen_share(one.lit), alike_unseen_share(one.lit)
+        unseen, added = unseen_share(one.lit), added_unseen(one.lit)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -132,9 +132,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
         torn_share=torn_share(points, one.lit),
-        by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, alike_unseen=alike)
-        if unseen or alike
-        else 0.0,
+        by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, added=added) if unseen or added else 0.0,
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
     )
 

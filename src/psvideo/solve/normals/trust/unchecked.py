@@ -55,11 +55,6 @@ all residuals together show of it: lights up to the first check each other, from
 4 to 8 lights on five photographed and rendered subjects, those that turn less than 2.7 times left 0.5 % of what is
 trusted over 10 degrees, up to 3.7 times 1.9 %, beyond 2.8 %. Five lights on a ring, 35 degrees from the axis: 2.6; four
 within one quarter: 13.)"""
-ALIKE_SEEN, ALIKE_UNSEEN = 5.0, 10.0
-"""The same for light that every lamp adds alike, as haze and skin do. Lamps that all stand at the same angle to one
-axis, as on a ring about the lens, take it for a normal that leans to that axis, and leave nothing over, however many
-there are. (Rings of 4, 6 and 8 lights whose angles differ by 2 degrees: 400, 38 and 22; by 12 degrees, 5 lights: 8, and
-normals of skin were 6 degrees off. Chance sets of 5 and 8 of photographs' lights: 7.7 and 3.7 half of the time.)"""
 NORMALS, FACING, LIT = 600, 0.35, 0.12
 """That is looked at in so many directions that face the camera so much, where all lights shine at such a cosine."""
 
@@ -91,28 +86,21 @@ def unseen_share(lit: Illumination) -> float:
     return min(max((turned_unseen(lit) - SEEN) / (UNSEEN - SEEN), 0.0), 1.0)
 
 
-def alike_unseen_share(lit: Illumination) -> float:
-    """Return 1 where residuals of four lights and more hardly show light that every lamp adds alike, and 0 where they
-    do; three leave nothing over, whatever it is, and what albedo shows of it was measured as a whole."""
-    if len(lit.directions) <= ALL_EXPLAINED:
-        return 0.0
-    turned = turned_unseen(lit, power=0)
-    return min(max((turned - ALIKE_SEEN) / (ALIKE_UNSEEN - ALIKE_SEEN), 0.0), 1.0)
-
-
-def turned_unseen(lit: Illumination, *, power: int = 2) -> float:
+def turned_unseen(lit: Illumination, *, shares: tuple[float, ...] | None = None) -> float:
     """Return by how many times more than all residuals together a surface that is not quite matte turns normals, root
     mean squares over normals that all lights reach; infinite where nothing is left over, 0 where no normal is so lit.
-    Its light goes with a little of this ``power`` of the cosine as well. Near lights count as they stand in the middle
-    of the picture."""
+    Its light goes with a little of the cosine's square as well, or lights add such ``shares`` of what they send
+    (light,) whichever way a surface faces. Near lights count as they stand in the middle of the picture."""
     if len(lit.directions) <= ALL_EXPLAINED:
         return float("inf")
     strengths = lit.intensities.mean(axis=1) / lit.intensities.mean()
-    return _turned(tuple(map(tuple, lit.directions.tolist())), tuple(strengths.tolist()), power)
+    return _turned(tuple(map(tuple, lit.directions.tolist())), tuple(strengths.tolist()), shares)
 
 
 @lru_cache(maxsize=64)
-def _turned(directions: tuple[tuple[float, ...], ...], strengths: tuple[float, ...], power: int) -> float:
+def _turned(
+    directions: tuple[tuple[float, ...], ...], strengths: tuple[float, ...], shares: tuple[float, ...] | None
+) -> float:
     """Return the same of distant lights, once for all rounds of a take."""
     place = (np.arange(NORMALS) + 0.5) / NORMALS
     z, around = 1 - place * (1 - FACING), np.pi * (1 + 5**0.5) * np.arange(NORMALS)  # evenly over a cap of the sphere
@@ -122,7 +110,8 @@ def _turned(directions: tuple[tuple[float, ...], ...], strengths: tuple[float, .
     lit_by_all = (cosines > LIT).all(axis=1)
     if not lit_by_all.any():
         return 0.0
-    normals, added = normals[lit_by_all], cosines[lit_by_all] ** power * strengths
+    normals, cosines = normals[lit_by_all], cosines[lit_by_all]
+    added = (cosines**2 if shares is None else np.broadcast_to(shares, cosines.shape)) * strengths
     matrix = ways * np.array(strengths)[:, None]
     g = added @ np.linalg.pinv(matrix).T
     left = added - g @ matrix.T
