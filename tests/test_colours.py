@@ -174,6 +174,25 @@ def test_a_rig_without_colours_is_left_alone(make_plan: MakePlan) -> None:
     assert unmixing_of(plan_of(make_plan, EXCHANGED), plain, channels=3) is None
 
 
+def test_lights_that_flash_one_by_one_are_apart_whatever_their_colours(make_plan: MakePlan) -> None:
+    """Taken apart all the same, they ended in a traceback where something moved."""
+    one_by_one = tuple(PlannedFlash(lights={f"{place}_red": 1.0}, duration_s=0.0008) for place in PLACES)
+    plan = replace(make_plan(dark=False), flashes=one_by_one)
+    assert unmixing_of(plan, rig_of(red=(1.0, 0.9, 0.8)), channels=3) is None
+
+
+def test_what_moves_under_flashes_that_show_not_every_lamp_is_not_had_from_one(make_plan: MakePlan) -> None:
+    pairs = [("key_red", "left_green"), ("left_blue", "top_red"), ("key_green", "top_blue")]
+    flashes = [PlannedFlash(lights=dict.fromkeys(pair, 1.0), duration_s=0.0008) for pair in pairs]
+    pale: dict[str, Vector] = {"red": (1.0, 0.6, 0.5), "green": (0.6, 1.0, 0.6), "blue": (0.5, 0.6, 1.0)}
+    plan, rig = replace(make_plan(dark=False), flashes=tuple(flashes)), rig_of(**pale)
+    normals, albedo = scene(np.random.default_rng(1))
+    moved = replace(flashed(plan, rig, normals, albedo), stood=np.zeros((1, 1), np.bool_))
+    plates = [replace(one, seen=np.zeros(len(one.image), np.bool_)) for one in moved.plates]
+    how = taken_apart(plan, rig)
+    assert unmixed(replace(moved, plates=tuple(plates)), how).lights == ("key", "left", "top")
+
+
 def card(rng: np.random.Generator, rig: Rig, *, exposure: float = 0.5) -> LightPictures:
     """Return pictures of a card of albedo 0.9 that faces the camera, under one light at a time."""
     images = []
@@ -325,6 +344,7 @@ def test_a_coloured_surface_under_exchanged_colours_gives_its_normals_and_albedo
     assert sorted(path.name for path in (tmp_path / "out" / "plates").iterdir())[-3:] == ["key", "left", "top"]
     assert len(report.lights) == 3
     assert "exchanged between flashes: plates are those of the lamps under white light" in report.trust
+    assert not any("as where nobody measured it" in one.found for one in report.judgements)  # colours were measured
 
 
 def test_split_takes_colours_apart_by_the_rig_and_asks_for_it(filmed: Path, tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ class Unmixing:
         (light, lit slot, channel): of a round's flashes, what gives a lamp's plate in every channel. None where colours
         are not exchanged.
     alone
-        What every lit slot shows by itself; empty where one flash is not enough.
+        What every lit slot shows by itself; of exchanged colours empty where a flash alone does not show every lamp.
     surface_colour
         The subject's colour, where it is given.
     condition
@@ -69,7 +69,8 @@ class Unmixing:
 
 
 def unmixing_of(plan: Plan, rig: Rig, *, channels: int) -> Unmixing | None:
-    """Return how a plan's flashes are separated, None where the rig knows of no colours.
+    """Return how a plan's flashes are separated, None where the rig knows of no colours, or where every flash is one
+    light and every lamp, too: they are apart, and solvers count their channels by what they send.
 
     Raises PsvideoError where some lights have a colour and others none, the pictures are grey, or the colours cannot be
     separated: it names the lights and the condition number.
@@ -79,6 +80,8 @@ def unmixing_of(plan: Plan, rig: Rig, *, channels: int) -> Unmixing | None:
         return None
     _check_colours(chosen, channels)
     lights = lights_as_planned(rig, plan)
+    if len(_lamps(lights)) == len(lights) and all(len(plan.flashes[slot].lit) < 2 for slot in plan.lit_slots):
+        return None
     seen = mixing_matrix(plan)[:, :, None] * intensities(lights, CHANNELS)  # (slot, light, channel)
     lamps = _lamps(lights)
     by_lamp = np.stack([seen[:, list(lamp)].sum(axis=1) for lamp in lamps], axis=1)
@@ -158,10 +161,14 @@ def _exchanged(plan: Plan, rig: Rig, lamps: Sequence[tuple[int, ...]], by_lamp: 
         shown=replace(plan, flashes=tuple(_renamed(flash, home) for flash in plan.flashes)),
         rig=_white(rig, {name: plan.lights[lamp[0]] for lamp, name in zip(lamps, names, strict=True)}),
         shares=shares,
-        alone=tuple(one for one in alone if one is not None) if None not in alone else (),
+        alone=tuple(one for one in alone if one is not None) if all(_shows_all(one, lamps) for one in alone) else (),
         surface_colour=rig.surface_colour,
         condition=condition,
     )
+
+
+def _shows_all(flash: OneFlash | None, lamps: Sequence[tuple[int, ...]]) -> bool:
+    return flash is not None and len(flash.lights) == len(lamps)
 
 
 def _one_by_one(plan: Plan, rig: Rig, seen: Doubles, condition: float) -> Unmixing:

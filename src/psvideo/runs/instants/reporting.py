@@ -3,7 +3,7 @@
 import json
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version as version_of
 from pathlib import Path
 
@@ -57,6 +57,8 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
     size = {"height_px": clip.height_px, "width_px": clip.width_px}
     if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
         points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
+        if take.unmixing is not None:  # whose lamps are of strength 1 by themselves, whatever was measured
+            points = replace(points, strengths_all_one=False)
     watched = "" if take.unmixing is None else slot_names(clip.plan)[0]
     return Observed(
         lights=clip.plan.lights,
