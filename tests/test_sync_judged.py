@@ -29,6 +29,7 @@ from psvideo.sync.rowfit.unknowns.bend import Knots, known_of_bends
 from psvideo.sync.verdict import believed
 from psvideo.sync.verdict.remarks import remarks
 from psvideo.sync.verdict.rivals import Rival
+from psvideo.sync.verdict.split_flashes import power_of_parts
 from psvideo.synth import Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
@@ -312,6 +313,49 @@ def test_light_that_was_read_by_another_curve_shows_where_a_row_splits_a_flash(
     assert least < timing.half.share < most
     assert timing.half.sentence in timing.notes
     assert not any("LEDs" in note or "exposure is" in note for note in timing.notes), "which the curve looks like"
+
+
+@pytest.mark.parametrize(
+    ("read", "least", "most"),
+    [
+        (lambda light: srgb_share(np.maximum(light, 0).astype(np.float32)), 0.65, 0.8),
+        (lambda light: np.log1p(200 * np.maximum(light, 0)) / np.log(200), 0.75, 0.95),
+        (lambda light: np.maximum(light, 0) ** 2.2, 0.1, 0.35),
+    ],
+)
+@pytest.mark.parametrize("degrees", [90.0, 180.0])
+def test_below_360_degrees_times_are_right_too_where_light_was_read_by_another_curve(
+    plan: Plan, read: Callable[[np.ndarray], np.ndarray], least: float, most: float, degrees: float
+) -> None:
+    """It was taken for another exposure with slow LEDs: all flashes 270 to 380 us off at claims of 25 to 83."""
+    seen = with_camera(plan, exposure_s=degrees / 360 * plan.camera.frame_period_s)
+    timing = timing_of(seen, read(in_columns(seen, 0)).mean(axis=2))
+    assert timing.half is not None
+    assert least < timing.half.share < most
+    assert abs(first_start_s(timing, seen) - 0.0123) < 0.05 * timing.row_time_s
+    assert timing.phase_error_s is not None
+    assert timing.phase_error_s < 0.1 * timing.row_time_s
+    assert not any("LEDs" in note or "exposure is" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(
+    ("coded", "named"), [(lambda part: np.log1p(270 * part) / np.log(271), True), (lambda part: part, False)]
+)
+def test_parts_of_flashes_that_come_to_more_than_all_of_it_show_another_curve_whatever_their_sizes(
+    coded: Callable[[np.ndarray], np.ndarray], *, named: bool
+) -> None:
+    """Of an S-Log3 bust that moved, read as linear, they came to 1.7 to 1.8: only a curve does that, or clipping."""
+    rng = np.random.default_rng(3)
+    seen = rng.uniform(0.35, 0.65, 130)
+    parts = coded(np.stack([seen, 1 - seen], axis=1)) + rng.normal(0, 0.02, (130, 2))
+    assert (power_of_parts(parts) is not None) is named
+
+
+def first_start_s(timing: Timing, plan: Plan) -> float:
+    """Return when a cycle of a strobe began whose clock is off by 30 ppm, nearest to 12.3 ms."""
+    begins_s = [flash.start_s for flash in timing.flashes if flash.slot == 0 and flash.complete]
+    cycle_s = plan.cycle_s * (1 + 30e-6)
+    return begins_s[0] - round((begins_s[0] - 0.0123) / cycle_s) * cycle_s
 
 
 @pytest.mark.parametrize("seed", range(3))

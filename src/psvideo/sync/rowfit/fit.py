@@ -18,6 +18,7 @@ from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, maybe_otherwise_s, straight, straightened
 from psvideo.sync.rowfit.unknowns.freed import Freed, freed
 from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
+from psvideo.sync.rowfit.unknowns.misread import OtherCurve, misread
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import across, restless
 from psvideo.sync.rowfit.unknowns.softness import misfit
@@ -30,6 +31,8 @@ FLASH_ROWS = 8
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
 MOST_WINDOWS = 400
+UNSURE = 0.02
+"""A fit whose times are unsure by more than this share of the shortest flash is worth being read by other curves."""
 MAINS_HZ = (100.0, 120.0)
 MAINS_EXPLAINS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
@@ -50,7 +53,7 @@ class ClipFit:
     explained (0 to 1) where flashes differ because the subject moves, else 0. ``unlit`` (frame,) are frames that were
     left out because no flash lights them. ``unsteady_s`` is by how much stretches of flashes are early or late, as a
     root mean square over the clip, beyond their jitter. ``regular``: frames are missing or repeated by a rule. ``seed``
-    is where it began.
+    is where it began. ``reading`` is the curve by which the rows were read again, if the plan's is wrong by far.
     """
 
     fit: Fit
@@ -68,6 +71,7 @@ class ClipFit:
     unsteady_s: float = 0.0
     across: float = 0.0
     regular: bool = False
+    reading: OtherCurve | None = None
 
 
 def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipFit:
@@ -93,7 +97,8 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
-    best = _best_fit(plan, stretches(fine), tracked.beat, free)
+    best, reading = _rightly_read(plan, stretches(fine), tracked.beat, free)
+    fine = reading.of(fine) if reading else fine
     if len(best.rows.value) == len(fine.value):
         plain, as_seen = _as_seen(plan, best.rows, best.fit)
     else:
@@ -117,6 +122,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         unsteady_s=loose_s,
         across=across(plan, best.rows, best.fit),
         regular=regular_step(tracked.index, rows.index) != 1,
+        reading=reading,
     )
 
 
@@ -134,6 +140,28 @@ class _Best:
     slack_s: float
     soft_s: float
     curves: tuple[Curve, ...]
+
+
+def _rightly_read(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> tuple[_Best, OtherCurve | None]:
+    """Return the best fit of some rows, read by another curve where that explains more than what the fit sets free."""
+    best = _best_fit(plan, rows, start, free)
+    if _strays(plan, best, free):
+        reading, unsure_s = misread(plan, best.rows, best.fit, free)
+        if reading:
+            return _best_fit(plan, reading.of(rows), start, free), reading
+        best = replace(best, apart_s=float(np.hypot(best.apart_s, unsure_s)))
+    return best, None
+
+
+def _strays(plan: Plan, best: _Best, free: tuple[str, ...]) -> bool:
+    """Return whether a fit strays so far from the plan, or leaves times so unsure, that rows may be misread. It takes
+    rows that open one after another to show how much of a flash each saw."""
+    if best.fit.beat.row_time_s * float(best.rows.place.max()) < plan.shortest_flash_s:
+        return False
+    if best.curves or best.soft_s or set(best.fit.errors_s) - set(free):
+        return True
+    apart_s = disagreement_s(plan, best.rows, best.fit)
+    return float(np.hypot(apart_s, np.hypot(best.fit.shift_error_s, best.apart_s))) > UNSURE * plan.shortest_flash_s
 
 
 def _best_fit(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> _Best:

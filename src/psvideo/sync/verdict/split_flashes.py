@@ -28,18 +28,31 @@ STRAIGHT = (0.8, 1.25)
 to 1.12 under LED tails and mains ripple; rec709, sRGB and S-Log3 that are read as others 0.52 to 0.56."""
 CLEARER = 0.6
 """Of what one sum for all parts leaves over, a power leaves at most this share where it is one."""
+MORE_THAN_ALL = 1.25
+"""Nor is there need of parts of all sizes where they come to more than this: nothing else but clipped light does."""
+UNCLIPPED = 0.02
+"""Rows count of whose light saturated pixels may hide less than this share in every frame."""
 POWERS = np.geomspace(0.05, 8.0, 200)
 
 
 def half_flash(plan: Plan, found: ClipFit) -> HalfFlash | None:
     """Return how bright half of a flash looks; None where that is half of all of it, or where the clip does not show
-    it: below 360 degrees, without a dark slot, where rows hold two flashes, or where too little stands still."""
+    it. The fit knows it where it read the rows by another curve; else it does not show below 360 degrees, without a
+    dark slot, where rows hold two flashes, or where too little stands still."""
+    if found.reading is not None:
+        return HalfFlash(share=found.reading.half)
     beat = found.fit.beat
     exposure_s = plan.camera.exposure_s  # another one may have been found for the curve's sake
     exposed = exposure_s >= WHOLE_SHUTTER * plan.camera.frame_period_s
     if not (exposed and plan.dark_s * beat.clock.rate >= NEARLY * exposure_s and beat.row_time_s > 0.0):
         return None
-    parts = _parts(plan, found)
+    power = power_of_parts(_parts(plan, found))
+    return None if power is None else HalfFlash(share=float(0.5**power))
+
+
+def power_of_parts(parts: Doubles) -> float | None:
+    """Return as which power of it light was read, by the shares of flashes that two frames saw, (part, 2); None where
+    it adds up, or where parts do not show it."""
     if len(parts) < LEAST_PARTS:
         return None
     raised = (parts[:, :, None] ** (1 / POWERS)).sum(axis=1)
@@ -47,9 +60,8 @@ def half_flash(plan: Plan, found: ClipFit) -> HalfFlash | None:
     power, sums = median(powers), parts.sum(axis=1)
     bent = quantile(powers, 0.9) < STRAIGHT[0] or quantile(powers, 0.1) > STRAIGHT[1]
     left = median(np.abs((parts ** (1 / power)).sum(axis=1) - 1))
-    if not bent or left > CLEARER * median(np.abs(sums - median(sums))):
-        return None
-    return HalfFlash(share=float(0.5**power))
+    one_power = left < CLEARER * median(np.abs(sums - median(sums)))
+    return power if bent and (one_power or quantile(sums, 0.1) > MORE_THAN_ALL) else None
 
 
 def _parts(plan: Plan, found: ClipFit) -> Doubles:
@@ -72,7 +84,8 @@ def _parts(plan: Plan, found: ClipFit) -> Doubles:
     strays = np.abs(seen - dark - all_of_it[light])
     spread = np.stack([_middle(np.where(whole[light == one], strays[light == one], np.nan)) for one in kinds])
     bright = np.nan_to_num(all_of_it)
-    steady = (bright > LEAST_LIGHT * bright.max()) & (spread < STEADY * bright)
+    hidden = 0.0 if rows.doubt is None else rows.doubt.max(axis=0)
+    steady = (bright > LEAST_LIGHT * bright.max()) & (spread < STEADY * bright) & (hidden <= UNCLIPPED * bright)
     counts = split & steady[light] & (light[:, None] > 0) & np.isfinite(seen + after)
     parts = np.stack([(one - dark)[counts] / all_of_it[light][counts] for one in (seen, after)], axis=1)
     return np.asarray(parts[(parts.min(axis=1) > PART[0]) & (parts.max(axis=1) < PART[1])])
