@@ -102,6 +102,20 @@ def test_a_mask_sequence_that_does_not_fit_is_refused_before_anything_is_solved(
         assert not (tmp_path / "out").exists()
 
 
+def test_masks_of_a_sequence_may_be_black_where_the_subject_has_left(tmp_path: Path) -> None:
+    """They were refused; where most are, no light is called dead and nothing untrusted for it."""
+    clip, matte = take(tmp_path / "take", plates() * 3), masks(tmp_path / "matte", [1001, 1002, 1003])
+    for number in (1001, 1003):
+        cv2.imwrite(str(matte / f"mask.{number}.png"), np.zeros((SIZE, SIZE), np.uint8))
+    report = solved(clip, tmp_path / "out", mask=matte, aov=["depth", "alpha", "error"], mesh=["ply"])
+    assert not isinstance(report, ps.PsvideoError)
+    for name in ("normals", "albedo", "depth", "alpha", "valid"):
+        assert [bool(one.any()) for one in written(tmp_path / "out", name)] == [False, True, False]
+    assert [one["valid_share"] is None for one in report["instants"]] == [True, False, True]
+    assert judged(report, "lights").startswith("good")
+    assert judged(report, "validity").startswith("good")
+
+
 def test_only_the_results_of_the_frames_that_are_used_need_a_mask(tmp_path: Path) -> None:
     clip = take(tmp_path / "take", plates() * 3)
     one = masks(tmp_path / "one", [1001])

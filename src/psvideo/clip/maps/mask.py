@@ -61,6 +61,23 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     ((120, 160), dtype('bool'))
     """
     path = path_of("path", path)
+    brightest, white = _brightest(path, width_px=width_px, height_px=height_px)
+    mask: NDArray[np.bool_] = brightest > 0.5 * white
+    if not mask.any():
+        most = float(brightest.max())
+        dim = f" (its brightest pixel is {most:.6g}, and white is {white:.6g})" if most > 0 else ""
+        raise PsvideoError(f"{path}: the mask is black everywhere{dim}; paint white where normals are wanted.")
+    return mask
+
+
+def read_one_of_many(path: Path, *, width_px: int | None = None, height_px: int | None = None) -> NDArray[np.bool_]:
+    """Read a mask of a sequence in the same way; it may be black, where there is nothing to solve."""
+    brightest, white = _brightest(path, width_px=width_px, height_px=height_px)
+    return np.asarray(brightest > 0.5 * white)
+
+
+def _brightest(path: Path, *, width_px: int | None, height_px: int | None) -> tuple[NDArray[Any], float]:
+    """Return every pixel's brightest channel, upright, and which code is white."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise PsvideoError(f"{path}: is not a picture that can be a mask; expected one of {', '.join(USUAL_KINDS)}.")
@@ -74,9 +91,4 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
             f"{path}: the mask is {cols} x {rows} pixels, and the frames are {width_px or cols} x {height_px or rows}. "
             "Paint it over a frame or a plate of this clip."
         )
-    mask: NDArray[np.bool_] = brightest > 0.5 * white
-    if not mask.any():
-        most = float(brightest.max())
-        dim = f" (its brightest pixel is {most:.6g}, and white is {white:.6g})" if most > 0 else ""
-        raise PsvideoError(f"{path}: the mask is black everywhere{dim}; paint white where normals are wanted.")
-    return mask
+    return brightest, white

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from psvideo.clip.folder import KINDS, find_sequence
-from psvideo.clip.maps.mask import read_mask
+from psvideo.clip.maps.mask import read_mask, read_one_of_many
 from psvideo.clip.record import holes
 from psvideo.compute.threads import in_order
 from psvideo.errors import PsvideoError
@@ -20,11 +20,15 @@ PLACEHOLDER = re.compile(r"%0?\d*d|#+|@+|\*")
 
 @dataclass(frozen=True, kw_only=True)
 class Masks:
-    """Masks of a run: a ``still``, (row, col) bool, True where to solve, or ``files`` by the number of their result."""
+    """Masks of a run: a ``still``, (row, col) bool, True where to solve, or ``files`` by the number of their result.
+
+    ``black`` are the numbers of those that leave nothing to solve.
+    """
 
     path: Path | None = None
     still: Mask | None = None
     files: Mapping[int, Path] = field(default_factory=dict)
+    black: tuple[int, ...] = ()
     sha256: str = ""
 
     def at(self, number: int) -> Mask:
@@ -32,7 +36,7 @@ class Masks:
         if self.still is not None:
             return self.still
         self.check([number])
-        return read_mask(self.files[number])
+        return read_one_of_many(self.files[number])
 
     def check(self, numbers: Iterable[int]) -> None:
         """Raise PsvideoError where the result with any of these numbers has no mask."""
@@ -48,8 +52,9 @@ class Masks:
 def open_masks(path: Path, *, width_px: int, height_px: int) -> Masks:
     """Return the mask in a picture, or those of a folder or of a numbered pattern; all are read and checked.
 
-    Raises PsvideoError where one cannot be read, has another size than the frames or is black everywhere, and where
-    numbers are missing between them.
+    Of a sequence some may be black: nothing is solved there, as where the subject has left the picture. Raises
+    PsvideoError where one cannot be read or has another size than the frames, where numbers are missing between them,
+    and where all are black everywhere.
     """
     files = _files(path)
     if files is None:
@@ -64,10 +69,15 @@ def open_masks(path: Path, *, width_px: int, height_px: int) -> Masks:
             "for all; paint what is missing, or copy the mask before."
         )
     digest = hashlib.sha256()
-    jobs = (partial(read_mask, file, width_px=width_px, height_px=height_px) for file in files.values())
-    for mask in in_order(jobs, ahead=4, name="masks"):
+    jobs = (partial(read_one_of_many, file, width_px=width_px, height_px=height_px) for file in files.values())
+    black = []
+    for number, mask in zip(files, in_order(jobs, ahead=4, name="masks"), strict=True):
         digest.update(mask.tobytes())
-    return Masks(path=path, files=files, sha256=digest.hexdigest())
+        if not mask.any():
+            black.append(number)
+    if len(black) == len(files):
+        read_mask(files[black[0]])  # says what is wrong with the first
+    return Masks(path=path, files=files, black=tuple(black), sha256=digest.hexdigest())
 
 
 def _files(path: Path) -> dict[int, Path] | None:

@@ -33,8 +33,9 @@ class InstantFacts:
     frame saw; ``borrowed_share`` is that of rows that other rounds showed. A void background counts as neither.
     ``change`` is what differs from the result before, at rest.
 
-    ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, or a mask
-    slips between the points that are counted, the latter where nothing was filled as well. ``levels`` (light) is each
+    ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, or a mask is
+    black or slips between the points that are counted, the latter where nothing was filled as well. Of a black mask no
+    light is known either: ``levels``, ``clipped`` and ``white`` are empty. ``levels`` (light) is each
     light's mean on the subject, 1.0 = saturation; ``clipped`` (light) the share of what was seen of it that is
     saturated, ``white`` (light) the light at which its plate is.
     ``ambient`` is the ambient light's share of what an exposure holds. ``speed_px_s`` is how fast the fastest parts
@@ -130,12 +131,13 @@ def instant_facts(
 ) -> InstantFacts:
     """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``stirs`` what
     moves in it, on any grid, ``dark`` the ambient light, thinned out as ``seen`` is, and ``some`` the surface, thinned.
-    Of a mask that holds none of the points, nothing is known."""
+    Of a mask that holds none of the points, or is black, nothing is known."""
     seen = seen or thinned_round(one, mask)
     some = thin_surface(surface) if some is None and surface is not None else some
-    subject, lights = seen.subject, seen.light
-    valid, measured = (None, None) if slips(mask) else _shares(surface, some, subject)
-    whites = [plate.saturation for plate in one.plates]
+    left_out = mask is not None and not mask.any()
+    subject, lights, plates = (seen.subject, [], ()) if left_out else (seen.subject, seen.light, one.plates)
+    valid, measured = (None, None) if left_out or slips(mask) else _shares(surface, some, subject)
+    whites = [plate.saturation for plate in plates]
     shares = [share_of(light >= white) if light.size else 0.0 for light, white in zip(lights, whites, strict=True)]
     levels = [float(light.mean()) if light.size else 0.0 for light in lights]
     return InstantFacts(
@@ -143,7 +145,7 @@ def instant_facts(
         time_s=one.time_s,
         valid_share=valid,
         measured_share=measured,
-        clipped_share=float(np.mean(shares)),
+        clipped_share=float(np.mean(shares)) if shares else 0.0,
         unseen_share=float(np.mean([1 - share_of(plate.lines_seen) for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
         change=change,
@@ -155,7 +157,7 @@ def instant_facts(
             subject,
             [
                 level * plate.brightest_share
-                for level, light, plate in zip(levels, lights, one.plates, strict=True)
+                for level, light, plate in zip(levels, lights, plates, strict=True)
                 if light.size
             ],
         ),

@@ -13,6 +13,7 @@ from psvideo.export.usd.usd_animation import write_animation
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.model.arrays import Pixels
+from psvideo.model.units import listed
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.sequence import coming
 from psvideo.plates.several_lights.unmixed import unmixing_note
@@ -90,6 +91,8 @@ def _checked(job: Job, output: Output) -> Job:
             "`aov='motion'` is what plates are brought to one instant by, and `align='none'` does not look for it. "
             "Leave one of the two out."
         )
+    if masks is not None and masks.black:
+        output.caller.say(f"{masks.path}: the masks of {listed(masks.black, 4)} are black: nothing is solved there.")
     if masks is not None and over_time.aligning.rate == "round":
         within = used_of(take, timing).flashes
         coming_rounds = coming(take.plan, timing.flashes, start=job.start_number, within=within).items()
