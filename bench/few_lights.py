@@ -101,12 +101,14 @@ def _row(name: str, count: int, sets: list[_Set]) -> Trusted:
     def mean(field: str) -> float:
         return float(np.mean([getattr(one, field) for one in sets]))
 
+    trusted = sum(one.trusted for one in sets)
+    over = sum(one.over * one.trusted for one in sets) / trusted if trusted else 0.0
     return Trusted(
         subject=name,
         lights=count,
         trusted=f"{100 * mean('trusted'):.0f} %",
         over_10_deg=f"{100 * mean('over'):.1f} %",
-        of_all_pixels=f"{100 * sum(one.over * one.trusted for one in sets) / sum(one.trusted for one in sets):.1f} %",
+        of_all_pixels=f"{100 * over:.1f} %",
         worst=f"{100 * max(one.over for one in sets):.0f} %",
         within=f"{100 * mean('within'):.0f} %",
         within_twice=f"{100 * mean('within_twice'):.0f} %",

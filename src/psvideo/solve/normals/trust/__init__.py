@@ -6,8 +6,9 @@ as they are typical of a point's ``surroundings``; ``torn`` normals, which belon
 from other surfaces, and how much farther noise spreads where fewer lamps reach, looked for while the plates are being
 solved; its loop: ``indirect_kernel``), albedo that goes with the slope (``by_slope``, and of light that all lamps add
 ``added_light``; both look at ``slope_pairs``, whose loops are in ``by_slope_kernel``) or pales where something shines
-(``by_colour``), ``near_spread`` (near lights, whose directions depend on the distance), ``moving_doubt`` (plates that
-do not match after alignment), ``few_checked`` (by how much a model of the subject would turn normals under four and
-five lights), and ``unchecked`` (what three lights leave of real surfaces, and show hardly anywhere; and how well few
-lights check each other). ``doubting`` says how much they count; its loops are in ``doubting_kernel``.
+(``by_colour``), shadows that pass for light (``lit_shadows``), ``near_spread`` (near lights, whose directions depend on
+the distance), ``moving_doubt`` (plates that do not match after alignment), ``few_checked`` (by how much a model of the
+subject would turn normals under four and five lights), and ``unchecked`` (what three lights leave of real surfaces, and
+show hardly anywhere; and how well few lights check each other). ``doubting`` says how much they count; its loops are in
+``doubting_kernel``.
 """

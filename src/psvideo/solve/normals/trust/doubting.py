@@ -59,7 +59,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
 
     counts = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
     factors = (counts, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
-    by_albedo = np.hypot(signs.by_slope_deg, signs.by_colour_deg)
+    by_three = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
     planes = np.stack(
         [
             *(signs.misfit_deg, signs.torn_deg, signs.likely_misfit_deg, signs.likely_torn_deg),
@@ -68,7 +68,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
                 np.broadcast_to(np.float32(one), signs.misfit_deg.shape)
                 for one in (
                     *(signs.uneven, signs.unchecked_deg),
-                    *(np.float32(how.by_model) * signs.by_model_deg, signs.torn_share, by_albedo),
+                    *(np.float32(how.by_model) * signs.by_model_deg, signs.torn_share, by_three),
                 )
             ),
         ]

@@ -206,7 +206,7 @@ def fill_doubt(signs: Floats, factors: Floats, out: Floats) -> None:
     signs: (sign, point) in degrees, a misfit and what is torn, both surely and likely; light from around; what noise
     makes more where few lights reach; what noise makes; which share of the misfit is uneven; what cannot be checked;
     what the whole error is at least; by how much of themselves torn normals count whatever else shows; what albedo
-    shows that goes with the slope, which is another sign of a misfit, and counts where it is more.
+    and shadows show where lights hardly check each other, other signs of a misfit, which count where they are more.
     factors: how much a misfit counts, for few lights as well; its power beyond 1; what is little of it; how much light
     from around counts, what is torn, and that at most, beside the rest and alone.
     """

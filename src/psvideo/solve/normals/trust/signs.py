@@ -4,8 +4,8 @@ These signs are looked for on a coarse grid, and around every pixel, since they 
 lights leave unexplained says how far the model is from the surface. Light that shows where a lamp does not reach came
 by way of other surfaces, which light everything alike and leave no residual. And normals that belong to no surface are
 wrong whatever the lights say of them (``torn.py``). Where lights can hardly be held against each other, albedo that
-goes with the slope shows what turns normals (``by_slope.py``), and albedo that pales what is mirrored
-(``by_colour.py``).
+goes with the slope shows what turns normals (``by_slope.py``), albedo that pales what is mirrored (``by_colour.py``),
+and normals that keep one angle to a lamp its shadow (``lit_shadows.py``).
 """
 
 import math
@@ -23,6 +23,7 @@ from psvideo.solve.normals.trust.added_light import Added, added_unseen
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
+from psvideo.solve.normals.trust.lit_shadows import shadows_deg
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
@@ -68,7 +69,8 @@ class Signs:
     ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals under four and five
     lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
     shows it, under lights that can hardly be held against each other (``by_slope.py``); ``by_colour_deg`` as its
-    colour does (``by_colour.py``)."""
+    colour does (``by_colour.py``). ``shadows_deg``: by how much they may be where a shadow that is lit from around
+    passes for light (``lit_shadows.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -85,6 +87,7 @@ class Signs:
     torn_share: Floats | float = 0.0
     by_slope_deg: Floats | float = 0.0
     by_colour_deg: Floats | float = 0.0
+    shadows_deg: Floats | float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
@@ -134,6 +137,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         torn_share=torn_share(points, one.lit),
         by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, added=added) if unseen or added else 0.0,
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
+        shadows_deg=np.float32(unseen) * shadows_deg(points, one.lit, still) if unseen else 0.0,
     )
 
 

@@ -66,17 +66,21 @@ def torn_share(points: ThinSurface, lit: Illumination) -> Floats | float:
     unseen = unseen_share(lit)
     if not unseen:
         return 0.0
-    if lit.near is None:
-        towards = lit.directions.astype(np.float32)[..., None, None]
-    else:
-        at = np.indices(points.known.shape).reshape(2, -1) * points.step
-        sent = sent_to(lit, (at[0], at[1])).astype(np.float32)
-        sent /= np.linalg.norm(sent, axis=-1, keepdims=True)
-        towards = np.moveaxis(sent, -1, 1).reshape(len(sent), 3, *points.known.shape)
-    cosines = (towards * points.planes).sum(axis=1)
+    cosines = (towards(points, lit) * points.planes).sum(axis=1)
     mean = np.maximum(cosines, 0).mean(axis=0)
     reaches = (cosines.min(axis=0) / np.maximum(mean, np.float32(1e-6)) - DIM) / (BRIGHT - DIM)
     return np.asarray(np.float32(unseen) / (1 + (TORN_IN_LIGHT - 1) * np.clip(reaches, 0, 1)), np.float32)
+
+
+def towards(points: ThinSurface, lit: Illumination) -> Floats:
+    """Return the unit vectors to all lights, (light, 3, row, col) of the points, or (light, 3, 1, 1) where they are the
+    same for all."""
+    if lit.near is None:
+        return np.asarray(lit.directions, np.float32)[..., None, None]
+    at = np.indices(points.known.shape).reshape(2, -1) * points.step
+    sent = sent_to(lit, (at[0], at[1])).astype(np.float32)
+    sent /= np.linalg.norm(sent, axis=-1, keepdims=True)
+    return np.asarray(np.moveaxis(sent, -1, 1).reshape(len(sent), 3, *points.known.shape))
 
 
 def unseen_share(lit: Illumination) -> float:
