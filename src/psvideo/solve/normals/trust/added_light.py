@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.model.arrays import Doubles, Floats
+from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.slope_pairs import LEAST_PAIRS, SlopePairs, of_place, robustly
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
@@ -74,16 +74,24 @@ def turned_by_added_deg(points: ThinSurface, pairs: SlopePairs, added: Sequence[
 
 
 def _surely(pairs: SlopePairs, stretches: Doubles) -> float:
-    """Return how many times by what ``stretches`` normals (pair,) albedo differs, less SURE standard errors: as the
-    subject's quarters agree on it, each by what its place leaves of that. Paint in large soft blobs goes with the slope
-    and the place of one quarter or another. Of a ball place leaves little, which a surface that is not matte shows in
-    its own way: it is no more than what the whole subject shows of it, whatever goes with the place."""
-    moves = of_place(pairs.other) - of_place(pairs.place)
+    """Return how many times by what ``stretches`` normals (pair,) albedo differs, as far as the quarters of the subject
+    agree on it: each by what its place leaves of that, since paint in large soft blobs goes with the slope and the
+    place of one quarter or another, and by the whole of it, whichever is less. Of a ball place leaves little, which a
+    surface that is not matte, or a wrong rig, shows in a way of its own."""
     low, right = (pairs.place > np.median(pairs.place, axis=0)).T
+    quarters = (low & right, low & ~right, ~low & right, ~low & ~right)
+    if min(np.count_nonzero(one) for one in quarters) < LEAST_PAIRS / 8:
+        return 0.0
+    moves = of_place(pairs.other) - of_place(pairs.place)
+    beside, whole = (_agreed(pairs, stretches, each, quarters) for each in (moves, moves[:, :0]))
+    return float(np.clip(whole, min(beside, 0.0), max(beside, 0.0)))
+
+
+def _agreed(pairs: SlopePairs, stretches: Doubles, moves: Doubles, quarters: Sequence[Mask]) -> float:
+    """Return the same in the mean of quarters, nearer to nothing by SURE standard errors, where albedo may go with what
+    ``moves`` (pair, any) as well."""
     found = list[tuple[float, float]]()
-    for one in (low & right, low & ~right, ~low & right, ~low & ~right):
-        if np.count_nonzero(one) < LEAST_PAIRS / 8:
-            return 0.0
+    for one in quarters:
         numbers, weights = robustly(np.concatenate([stretches[one, None], moves[one]], axis=1), pairs.differs[one])
         root = np.sqrt(weights)
         weighed, own = moves[one] * root[:, None], stretches[one] * root
@@ -93,7 +101,4 @@ def _surely(pairs: SlopePairs, stretches: Doubles) -> float:
     counts /= max(float(counts.sum()), 1e-12)
     mean = float((counts * each).sum())
     error = SURE * float(np.sqrt(len(each) / (len(each) - 1) * ((counts * (each - mean)) ** 2).sum()))
-    if abs(mean) <= error:
-        return 0.0
-    whole = float(robustly(stretches[:, None], pairs.differs)[0][0])
-    return float(np.clip(whole, 0.0, mean - error) if mean > 0 else np.clip(whole, mean + error, 0.0))
+    return mean - float(np.clip(mean, -error, error))
