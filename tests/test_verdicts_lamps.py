@@ -230,6 +230,34 @@ def test_a_lamp_that_flickers_is_not_said_to_drift(rounds: int) -> None:
         assert not any("grows" in line.found or "fades" in line.found for line in said)
 
 
+@pytest.mark.parametrize("rounds", [6, 12, 60])
+@pytest.mark.parametrize("fading", ["a", "ab", "abc"])
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_lamps_that_give_what_they_gave_are_not_blamed_for_those_that_fade(
+    count: int, fading: str, rounds: int
+) -> None:
+    """Where two of four faded by 14 %, the other two were said to grow by 6 %."""
+    if len(fading) >= count:
+        fading = fading[: count - 1]
+    levels = 0.3 * (1 + 0.002 * np.random.default_rng(3).standard_normal((rounds, count)))
+    levels[:, : len(fading)] *= 1 - 0.14 * np.linspace(0, 1, rounds)[:, None]
+    said = [line.found for line in lamps(Observed(lights=tuple("abcd"[:count]), facts=steady_but(levels)))]
+    assert len(said) == len(fading)
+    for light, found in zip(fading, said, strict=True):
+        assert re.search(f"The light '{light}' fades by (9|1[0-4]) %", found)
+
+
+@pytest.mark.parametrize("rounds", [6, 7, 8, 30])
+def test_a_lamp_that_fades_is_named_under_a_gain_that_swings(rounds: int) -> None:
+    rng = np.random.default_rng(5)
+    levels = 0.3 * (1 + 0.002 * rng.standard_normal((rounds, 4))) * (1 + 0.03 * (-1.0) ** np.arange(rounds))[:, None]
+    levels[:, 1] *= 1 - 0.15 * np.linspace(0, 1, rounds)
+    fading = [line.found for line in lamps(Observed(lights=tuple("abcd"), facts=steady_but(levels)))]
+    assert [found[:19] for found in fading if " fades by 1" in found or " grows by " in found] == [
+        "The light 'b' fades"
+    ]
+
+
 def test_one_light_is_not_compared_with_itself() -> None:
     assert [line.found for line in lamps(looked_at([even("a", 0.5)]))] == ["The light fires in every round."]
 

@@ -12,8 +12,8 @@ from psvideo.report.observe.facts import InstantFacts
 
 UNSTEADY = 0.02
 DRIFTS, STEADILY = 0.05, 3.0
-"""A lamp drifts that gives so much more or less in the last third of a take than in the first, beside what the others
-do, and so many times more than it changes from round to round: one that flickers does not."""
+"""A lamp drifts that gives so much more or less in the last third of a take than in the first, by itself and beside
+what the others do, and so many times more than it changes from round to round: one that flickers does not."""
 FEW_ROUNDS = 9
 """In fewer rounds a third of them is one or two, which flicker apart by chance: all steps must be the same way then."""
 ALIKE = 0.6
@@ -35,8 +35,10 @@ def unsteady(
         return
     share = level / np.maximum(usual, 1e-9)
     change = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
-    drift = _drift(share, alive)
-    drifts = alive & still.all() & _one_way(share) & (np.abs(drift) > np.maximum(DRIFTS, STEADILY * change))
+    beside = share / _common(share, alive)[:, None]
+    drift, own = _grown(beside), _grown(share)
+    beyond = np.maximum(DRIFTS, STEADILY * np.median(np.abs(np.diff(beside, axis=0)), axis=0))
+    drifts = alive & still.all() & _one_way(beside) & (np.abs(drift) > beyond) & (own * np.sign(drift) > DRIFTS)
     for light, by in zip(np.array(lights)[drifts].tolist(), drift[drifts].tolist(), strict=True):
         yield _drifting(light, by)
     flicker = alive & (change > UNSTEADY) & ~drifts
@@ -53,13 +55,19 @@ def unsteady(
             )
 
 
-def _drift(share: Doubles, alive: Flags) -> Doubles:
-    """Return by which share each lamp, (light,), gives more in the last third of the rounds than in the first, beside
-    what the others do: ``share`` (round, light) is of its usual light."""
+def _common(share: Doubles, alive: Flags) -> Doubles:
+    """Return the course that lamps have in common, (round,): as under the camera's gain. It is that of lamps which give
+    in the end what they gave at first, where there are any: a gain that grew would show in them. Else that of all.
+    ``share`` (round, light) is of a lamp's usual light."""
+    steady = alive & (np.abs(_grown(share)) <= UNSTEADY)
+    of = steady if steady.any() else alive if alive.any() else np.ones_like(alive)
+    return np.asarray(np.maximum(np.median(share[:, of], axis=1), 1e-9))
+
+
+def _grown(share: Doubles) -> Doubles:
+    """Return by which part each lamp, (light,), gives more in the last third of the rounds than in the first."""
     third = max(len(share) // 3, 1)
-    grown = np.median(share[-third:], axis=0) / np.maximum(np.median(share[:third], axis=0), 1e-9)
-    common = float(np.median(grown[alive])) if alive.any() else 1.0
-    return np.asarray(grown / max(common, 1e-9) - 1)
+    return np.asarray(np.median(share[-third:], axis=0) / np.maximum(np.median(share[:third], axis=0), 1e-9) - 1)
 
 
 def _one_way(share: Doubles) -> Flags:
