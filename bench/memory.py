@@ -3,7 +3,7 @@
 ``python -m bench.memory [still|moving ...] [--against FOLDER]``: FOLDER is a checkout of an earlier state. A clip of 60
 frames (six rounds) at rest, and one of which the middle half moves, as defaults have it and with depth; 16-bit TIFF,
 with timing.json given. Longer clips take no more (``tests/test_memory.py``). A process that runs over tiny pictures
-holds 267 MB: Python, libraries and compiled loops.
+holds about 222 MB: Python, libraries and compiled loops.
 """
 
 import argparse

@@ -75,6 +75,23 @@ assert main(sys.argv[1:]) == 0
 print(next(line for line in open("/proc/self/status") if line.startswith("VmHWM")))
 """
 
+MOST_COMPILER_KB = 8192
+"""Loading the loops of a whole run needs 4 MB of LLVM's code."""
+LOADING = """
+import numpy as np
+from psvideo.pictures.relit_kernel import relit
+plane = np.zeros((8, 8), np.float16)
+relit((plane,) * 3, (plane,) * 3, np.zeros(3, np.float32), 2)
+held, here = 0, False
+for line in open("/proc/self/smaps"):
+    first, *rest = line.split()
+    if not first.endswith(":"):
+        here = "libllvmlite" in line and rest[0] == "r-xp"
+    elif here and first == "Rss:":
+        held += int(rest[0])
+print(held)
+"""
+
 
 def filmed(folder: Path, size: tuple[int, int], frames: int) -> Path:
     """Write a clip of a relief at rest: five frames that come again and again, in files that are links."""
@@ -170,6 +187,14 @@ def peak_mb(folder: Path, *more: str) -> float:
     call = [sys.executable, "-c", COMMAND, *map(str, words), "-o", str(folder / "out"), "--force", "-q"]
     done = subprocess.run(call, capture_output=True, text=True, check=True)
     return int(done.stdout.split()[-2]) / 1024
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what a process holds of a library is what Linux says")
+def test_nothing_of_the_compiler_s_code_is_held_once_loops_are_loaded() -> None:
+    """52 MB of it stayed to the end of every run."""
+    for _ in range(2):  # the first one may compile
+        done = subprocess.run([sys.executable, "-c", LOADING], capture_output=True, text=True, check=True)
+    assert int(done.stdout) <= MOST_COMPILER_KB
 
 
 @pytest.mark.parametrize(("said", "huge"), [({}, "0"), ({"NUMPY_MADVISE_HUGEPAGE": "1"}, "1")])

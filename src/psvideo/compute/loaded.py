@@ -14,6 +14,7 @@ import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 
+from psvideo.compute.compilers_code import let_compiler_go
 from psvideo.compute.parts import TRIED
 
 _Library: Any = JITCodeLibrary
@@ -72,4 +73,6 @@ def loaded(target: Any, kept: Any) -> Any:
     if numba.version_info.short not in TRIED or kind != "object":
         return _Result._rebuild(target, *kept)
     names = (function.llvm_func_name, function.llvm_cpython_wrapper_name, function.llvm_cfunc_wrapper_name)
-    return _Result._rebuild(_Through(target, names), *kept)._replace(target_context=target)
+    result = _Result._rebuild(_Through(target, names), *kept)._replace(target_context=target)
+    let_compiler_go()
+    return result
