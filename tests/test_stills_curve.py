@@ -184,6 +184,21 @@ def test_a_mirrored_lamp_in_a_merged_picture_makes_the_rest_neither_dark_nor_cli
     assert not any("clip" in one or "dark" in one for one in report.findings)
 
 
+@pytest.mark.parametrize("transfer", ["linear", "srgb"])
+def test_twelve_bits_in_files_of_sixteen_count_from_the_white_that_is_named(tmp_path: Path, transfer: str) -> None:
+    """Without it the picture is called dark, what is clipped passes for light, and an sRGB curve tilts normals."""
+    pictures = [np.clip(1.6 * one, 0, 1) for one in lit()]
+    codes = [4095 / 65535 * (one if transfer == "linear" else as_srgb(one)) for one in pictures]
+    folder, lights = photographs(tmp_path / "photos", codes), listed(tmp_path / "l.lp")
+    report = ps.stills(folder, lights=lights, out=tmp_path / "out", transfer=transfer, white_level=4095)
+    assert "They saturate at code 4095, as you say" in remarks(report)
+    assert error_deg(tmp_path / "out") < 1.5
+    said = " ".join(f"{one.grade}: {one.found}" for one in report.judgements if one.subject in ("exposure", "clipping"))
+    assert "Every light clips: 18 to 20 % of the subject" in said
+    with pytest.raises(PsvideoError, match=r"`white_level` is 70000, and shot 3.png holds codes up to 65535"):
+        ps.stills(folder, lights=lights, out=tmp_path / "none", white_level=70000)
+
+
 def test_what_a_file_says_of_itself_is_read(tmp_path: Path) -> None:
     exif = Image.Exif()
     exif[0x010F], exif[0x0110] = "Canon", "Canon EOS 5D"

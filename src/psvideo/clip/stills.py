@@ -17,7 +17,7 @@ from psvideo.clip.record import Clip, Header, shot_of
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.clip.stated_curve import curve_of_pictures
 from psvideo.clip.transfer import find_curve
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.model.turn import UPRIGHT
@@ -35,8 +35,9 @@ BAND_ROWS, SAMPLED_PX = 256, 1 << 20
 class Photographs:
     """Pictures of one scene by one camera: their files, what kind they are, and what they say of themselves.
 
-    transfer: the name of the curve by which they are read; because: why. white: where floating-point pictures that go
-    beyond 1 are taken to clip: developed or merged ones do not at 1; brightest: their brightest sample.
+    transfer: the name of the curve by which they are read; because: why. white: the code at which they clip, where
+    somebody says it, or where floating-point pictures that go beyond 1 are taken to: developed or merged ones do not at
+    1; brightest: these ones' brightest sample.
     """
 
     files: tuple[Path, ...]
@@ -75,9 +76,9 @@ class Photographs:
         )
 
 
-def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photographs:
-    """Look at photographs without decoding them, but for floating-point ones. ``transfer`` is the curve where somebody
-    says it.
+def look_at(files: Sequence[Path], *, transfer: str | None = None, white_level: float | None = None) -> Photographs:
+    """Look at photographs without decoding them, but for floating-point ones. ``transfer`` is the curve, and
+    ``white_level`` the code of saturation, where somebody says them.
 
     Raises PsvideoError where one cannot be read, or where they are not of one kind, size, position and curve.
     """
@@ -103,7 +104,10 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
     name, because = (transfer, "as you say") if transfer else curve_of_pictures(files, kind, headers[0], stated)
     find_curve(name)
     header = headers[0] if headers[0].turn != UPRIGHT else replace(headers[0], turn=stated[0].turn)
-    white, brightest = _white_beyond(kind, files) if header.bits is None else (None, 0.0)
+    white, brightest = (white_level, 0.0)
+    if white is None and header.bits is None:
+        white, brightest = _white_beyond(kind, files)
+    _check_level(files[0], header, white_level)
     return Photographs(
         files=tuple(files),
         kind=kind,
@@ -114,6 +118,16 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
         white=white,
         brightest=brightest,
     )
+
+
+def _check_level(file: Path, header: Header, white_level: float | None) -> None:
+    """Raise UsageError where a code of saturation is none that such a picture holds."""
+    most = float("inf") if header.bits is None else 2.0**header.bits - 1
+    if white_level is not None and not 0 < white_level <= most:
+        raise UsageError(
+            f"`white_level` is {white_level:g}, and {file.name} holds codes up to {most:g}. Give the code at which "
+            "these pictures saturate, such as 4095 of 12 bits in files of 16, or leave it out."
+        )
 
 
 def _white_beyond(kind: str, files: Sequence[Path]) -> tuple[float | None, float]:

@@ -42,6 +42,7 @@ def stills(
     dark: Path | str | None = None,
     mask: Path | str | None = None,
     transfer: str | None = None,
+    white_level: float | None = None,
     focal_px: float | None = None,
     focal_mm: float | None = None,
     sensor_mm: float | None = None,
@@ -72,7 +73,8 @@ def stills(
       positions. ``spheres``: how many each picture holds; ``circle``: outlines found by hand, x, y and radius in
       pixels.
     - ``transfer``: how the files code light. Left out: as their ICC profile or PNG chunk says, else sRGB for 8 bits and
-      linear for 16 bits, EXR and DNG. The report says which, and what speaks against it.
+      linear for 16 bits, EXR and DNG. The report says which, and what speaks against it. ``white_level``: the code at
+      which they saturate, where that is not the largest one: 4095 of 12 bits in files of 16.
     - ``rti``: write ``rti/`` too, a polynomial texture map that OpenLIME shows in a web page, and the same as ``.ptm``
       (of distant lights).
     - ``solver``, ``fill``, ``preset``, ``aov``, ``mesh``, ``encode``, ``plates``, ``force``: as for ``normals``.
@@ -130,7 +132,7 @@ def stills(
         mask=path_if_given("mask", mask),
     )
     with tempfile.TemporaryDirectory(prefix="psvideo-stills-") as place:
-        opened = still_clip(path, pairs, known, looking, Path(place), transfer=transfer)
+        opened = still_clip(path, pairs, known, looking, Path(place), transfer=transfer, white_level=white_level)
         take = Take(clip=opened.clip, numbers=opened.clip.numbers)
         for note in take.clip.notes:
             caller.say(note)

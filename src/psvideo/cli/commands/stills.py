@@ -38,6 +38,12 @@ def stills(
         Path | None, typer.Option("--mask", help="A picture, white where to solve; left out: one named mask.")
     ] = None,
     transfer: Transfer = None,
+    white_level: Annotated[
+        float | None,
+        typer.Option(
+            help="The code at which the pictures saturate: 4095 of 12 bits in files of 16; left out: the largest one."
+        ),
+    ] = None,
     solver: SolverOption = "auto",
     fill: Fill = True,
     preset: ProgramOption = None,
@@ -66,6 +72,7 @@ def stills(
         dark=dark,
         mask=mask,
         transfer=transfer,
+        white_level=white_level,
         **seen.parameters(),
         solver=solver,
         fill=fill,

@@ -1,6 +1,18 @@
 """The panels that group options in the help of commands with many of them."""
 
-STILLS = ("lights", "sphere", "spheres", "dark", "transfer", "focal_px", "focal_mm", "sensor_mm", "radius_mm", "circle")
+STILLS = (
+    "lights",
+    "sphere",
+    "spheres",
+    "dark",
+    "transfer",
+    "white_level",
+    "focal_px",
+    "focal_mm",
+    "sensor_mm",
+    "radius_mm",
+    "circle",
+)
 """What photographs are read with."""
 
 CLIP = "The clip and its timing"

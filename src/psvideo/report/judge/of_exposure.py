@@ -40,7 +40,10 @@ MORE_LIGHT = (
     "Check that the lights fire, that the lens is open, and that plan.toml's black_level and transfer are right."
 )
 
-FEWER_BITS = "Where files hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead."
+FEWER_BITS = (
+    "Where files hold fewer bits than they have room for (12 in 16), plan.toml's white_level says so instead, "
+    "and `white_level` of photographs."
+)
 
 
 def ceiling_of(encoding: Encoding) -> Ceiling:

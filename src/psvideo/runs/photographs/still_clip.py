@@ -45,11 +45,18 @@ class StillClip:
 
 
 def still_clip(
-    folder: Path, pairs: Pairs, known: KnownLights, looking: Looking, place: Path, *, transfer: str | None
+    folder: Path,
+    pairs: Pairs,
+    known: KnownLights,
+    looking: Looking,
+    place: Path,
+    *,
+    transfer: str | None,
+    white_level: float | None = None,
 ) -> StillClip:
     """Return the photographs as a clip; plan and rig are written into ``place``."""
     files = (*pairs.files, *([pairs.dark] if pairs.dark else []))
-    pictures = look_at(files, transfer=transfer)
+    pictures = look_at(files, transfer=transfer, white_level=white_level)
     _check_size(folder, pictures, known)
     rig = known.at(pairs.places, pairs.names)
     glance = glance_at(pictures, rig.lights)
@@ -158,6 +165,8 @@ def _assumed(pictures: Photographs) -> str:
     said = f"The pictures were read as {pictures.transfer!r}, {pictures.because}."
     if pictures.white is None:
         return said
+    if pictures.header.bits is not None:
+        return f"{said} They saturate at code {pictures.white:g}, as you say."
     if pictures.brightest <= pictures.white:
         return f"{said} They hold light up to {pictures.white:.3g}: nothing below it counts as clipped."
     most, white = pictures.brightest, pictures.white

@@ -138,7 +138,8 @@ def _thin(pictures: Photographs, file: Path) -> Doubles:
     rows = np.arange(step // 2, codes.shape[0], step)
     some = codes.some(rows)[rows - rows[0]] if isinstance(codes, RowsInFile) else codes[rows]
     cols = np.arange(step // 2, codes.shape[1], step)
-    thin = _signals(some[:, cols].astype(np.float64), pictures.header, rows, cols)
+    head = replace(pictures.header, white=pictures.white or pictures.header.white)
+    thin = _signals(some[:, cols].astype(np.float64), head, rows, cols)
     return np.asarray((thin if thin.ndim == 2 else thin[..., 1]).ravel(), np.float64)
 
 
