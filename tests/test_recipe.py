@@ -153,6 +153,34 @@ def test_however_short_the_dark_time_what_is_called_seen_is_the_flash_alone(
         np.testing.assert_allclose(found[recipe.seen], plates[flash.index][recipe.seen], atol=2e-2)
 
 
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(
+    first=st.floats(0.012, 0.03),
+    shutter=st.sampled_from([1.0, 0.9, 0.5]),
+    gap=st.sampled_from([0.95, 1.0, 1.1]),
+    fall=st.floats(2.5e-4, 5e-3),
+    missing=st.sampled_from([(), (5,), (4, 7)]),
+)
+def test_however_long_the_tails_what_is_called_seen_is_the_flash_alone(
+    first: float, shutter: float, gap: float, fall: float, missing: tuple[int, ...]
+) -> None:
+    """Frames that saw next to nothing of a flash once brought whole other flashes into its plate."""
+    camera, random = camera_of(shutter=shutter), np.random.default_rng(5)
+    timing = timing_of(camera, gap=gap, first_s=first, fall_s=fall, dark=9)
+    plates = random.uniform(0.2, 1.0, (8, ROWS))
+    frames, there = frames_seen(camera, timing, plates, np.zeros(ROWS)), frozenset(range(FRAMES)) - set(missing)
+    for flash in timing.flashes[2:6]:
+        recipe = flash_recipe(camera, timing, flash, there)
+        found = made(recipe, frames) if recipe.frames else np.zeros(ROWS)
+        np.testing.assert_allclose(found[recipe.seen], plates[flash.index][recipe.seen], atol=3e-2)
+
+
+def test_tails_of_most_of_a_flash_hide_no_row_of_a_camera_that_is_always_open() -> None:
+    camera = camera_of()
+    timing = timing_of(camera, fall_s=7e-4)
+    assert all(flash_recipe(camera, timing, flash, range(FRAMES)).seen.all() for flash in timing.flashes[2:6])
+
+
 def test_a_neighbour_whose_frames_are_missing_hides_the_rows_that_it_reaches_into() -> None:
     camera, timing = camera_of(), timing_of(camera_of(), gap=0.97, dark=9)
     flash = timing.flashes[3]

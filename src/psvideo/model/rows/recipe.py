@@ -9,7 +9,8 @@ share that they saw together, which is 1 at 360 degrees.
 Rows in which the frames also saw some of a neighbouring flash (an LED's tail, or a dark time that is too short) have it
 taken off: with the weights W (flash, frame) and these first coefficients C (flash, frame) of the flashes around, the
 sums hold ``C W^T`` of the plates, so ``(C W^T)^-1 C`` holds each alone. The coefficients of the neighbours' frames are
-small and negative.
+small and negative. Frames that saw hardly any of a flash take no part in its sum: they would bring in later flashes, of
+which nothing is known here.
 """
 
 from dataclasses import dataclass
@@ -27,20 +28,23 @@ WHOLE_BUT_TAIL = 1.0 - 1e-3
 """A row that saw this share of a flash with tails, which never quite end, saw all of it."""
 LEAST_SHARE = 0.05
 """A row that saw less of a flash than this is unseen: dividing by so little would bring up only noise."""
+LEAST_PART = 1e-3
+"""A frame's row that saw less of a flash than this takes no part in its sum: tails never quite end."""
 NO_FOREIGN = 1e-5
 """Less of another flash in a row is below the last bit of a code."""
 MOST_FOREIGN = 0.3
 """A frame's row into which more of other flashes was mixed than this is not used."""
 CLEAN = 0.01
-"""A dark slot's exposures that saw less of other flashes are enough by themselves where there are any."""
+"""A dark slot's exposures that saw less of other flashes are enough by themselves where there are any; a flash's where
+they saw less of others than this share of what they saw of itself."""
 MOST_LEFT = 0.01
-"""Of another flash that cannot be taken off this much may be left in a row; with more it is unseen."""
+"""Of other flashes that cannot be taken off this much may be left in a row; with more it is unseen."""
 MOST_GAIN = 2.5
 """Taking neighbours off may raise noise (as its square) this many times at most."""
 LEAST_DETERMINANT = 1e-3
 """Sums that hold the same mixture of flashes cannot be separated."""
-NEIGHBOURS = 2
-"""Flashes before and after that may reach into a flash's rows."""
+NEIGHBOURS, FARTHEST = 2, 4
+"""So many flashes before and after may reach into a flash's rows, and so many more into the rows of these."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +87,9 @@ def flash_recipe(camera: Camera, timing: Timing, flash: Flash, there: range | fr
     weights = row_weights(camera, start_s, duration_s, frames=frames, pulse=timing.pulse)
     if flash.is_dark:  # nothing shines in it, so nothing has a tail
         weights[0] = row_weights(camera, start_s[:1], duration_s[:1], frames=frames)[0]
-    weights[:, ~present] = 0.0
-    coefficients, seen = _separated(weights, whole=_whole(timing.pulse), dark=flash.is_dark)
+    beyond = _beyond(camera, timing, flash, frames)
+    weights[:, ~present], beyond[~present] = 0.0, 0.0
+    coefficients, seen = _separated(weights, beyond, whole=_whole(timing.pulse), dark=flash.is_dark)
     used = np.flatnonzero(coefficients.any(axis=1))
     return FlashRecipe(frames=tuple(frames[n] for n in used), coefficients=coefficients[used], seen=seen)
 
@@ -100,6 +105,17 @@ def _around(timing: Timing, flash: Flash) -> tuple[Flash, ...]:
     return timing.flashes[max(flash.index - NEIGHBOURS, 0) : flash.index + NEIGHBOURS + 1]
 
 
+def _beyond(camera: Camera, timing: Timing, flash: Flash, frames: range) -> Doubles:
+    """Return how much the frames' rows saw of flashes that are not taken off, (frame, row)."""
+    none: Doubles = np.zeros((len(frames), camera.height_px))
+    if not _may_mix(camera, timing):
+        return none
+    near = range(flash.index - NEIGHBOURS, flash.index + NEIGHBOURS + 1)
+    around = timing.flashes[max(near.start - FARTHEST, 0) : near.stop + FARTHEST]
+    others = tuple(one for one in around if not one.is_dark and one.index not in near)
+    return row_weights(camera, *_times(others), frames=frames, pulse=timing.pulse).sum(axis=0) if others else none
+
+
 def _times(flashes: tuple[Flash, ...]) -> tuple[Doubles, Doubles]:
     return np.array([one.start_s for one in flashes]), np.array([one.duration_s for one in flashes])
 
@@ -108,29 +124,34 @@ def _whole(pulse: Pulse) -> float:
     return WHOLE_BUT_TAIL if pulse.fall_s > 0 else WHOLE
 
 
-def _separated(weights: Doubles, *, whole: float, dark: bool) -> tuple[Doubles, Flags]:
+def _separated(weights: Doubles, beyond: Doubles, *, whole: float, dark: bool) -> tuple[Doubles, Flags]:
     """Return the coefficients (frame, row) of the first of the flashes, and which rows are seen.
 
-    ``weights`` is (flash, frame, row). Where a neighbour cannot be taken off, or only at the price of noise, the frames
-    that saw hardly any of it must do.
+    ``weights`` is (flash, frame, row); ``beyond`` (frame, row) is what is not taken off. Where a neighbour cannot be
+    taken off, or only at the price of noise, the frames that saw hardly any of it must do.
     """
-    first = np.stack([_first(weights, flash, whole=whole, dark=dark and flash == 0) for flash in range(len(weights))])
+    foreign = weights.sum(axis=0) + beyond - weights
+    some = weights * (foreign <= MOST_FOREIGN)
+    first = np.stack(
+        [_first(*one, whole=whole, dark=dark and not n) for n, one in enumerate(zip(some, foreign, strict=True))]
+    )
     own = first[0].copy()
     mixed = np.einsum("fr,kfr->kr", own, weights[1:])  # what the first sum holds of the other flashes
-    rows = np.flatnonzero((np.abs(mixed) > NO_FOREIGN).any(axis=0))
+    rows = np.flatnonzero((np.abs(mixed) > NO_FOREIGN).any(axis=0) | ((own * beyond).sum(axis=0) > NO_FOREIGN))
     if rows.size:
         own[:, rows], kept = _taken_off(first[:, :, rows], weights[:, :, rows], dark=dark)
+        others = np.concatenate([weights[1:, :, rows], beyond[None, :, rows]])
+        kept &= (np.abs(np.einsum("fr,kfr->kr", own[:, rows], others)) <= MOST_LEFT).all(axis=0)
         kept &= (own[:, rows] ** 2).sum(axis=0) <= MOST_GAIN * (first[0][:, rows] ** 2).sum(axis=0)
-        clean = _first(weights, 0, whole=whole, dark=dark, most_foreign=CLEAN)
+        most = CLEAN if dark else CLEAN * weights[0]
+        clean = _first(weights[0] * (foreign[0] <= most), foreign[0], whole=whole, dark=dark)
         own[:, rows[~kept]] = clean[:, rows[~kept]]
     return own, np.asarray(own.any(axis=0))
 
 
-def _first(weights: Doubles, flash: int, *, whole: float, dark: bool, most_foreign: float = MOST_FOREIGN) -> Doubles:
-    """Return a flash's coefficients (frame, row) as if there were no other: one whole frame alone, else all that saw
-    any; of a dark slot the mean of the exposures that fell into it."""
-    foreign = weights.sum(axis=0) - weights[flash]
-    seen = weights[flash] * (foreign <= most_foreign)
+def _first(seen: Doubles, foreign: Doubles, *, whole: float, dark: bool) -> Doubles:
+    """Return the coefficients (frame, row) of a flash of which so much was ``seen`` as if there were no other: one
+    whole frame alone, else all that saw some; of a dark slot the mean of the exposures that fell into it."""
     if dark:
         clean = (seen > 0) & (foreign <= CLEAN)
         used = np.where(clean.any(axis=0), clean, seen > 0)
@@ -138,26 +159,22 @@ def _first(weights: Doubles, flash: int, *, whole: float, dark: bool, most_forei
         return mean
     full = seen >= whole
     alone = full & (np.cumsum(full, axis=0) == 1)
-    used = np.where(full.any(axis=0), alone, seen > 0)
+    used = np.where(full.any(axis=0), alone, seen > LEAST_PART)
     share = (seen * used).sum(axis=0)
     coefficients: Doubles = used * np.where(share >= LEAST_SHARE, 1.0 / np.maximum(share, LEAST_SHARE), 0.0)
     return coefficients
 
 
 def _taken_off(first: Doubles, weights: Doubles, *, dark: bool) -> tuple[Doubles, Flags]:
-    """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where they can be.
-
-    A flash of which no frame there saw enough cannot be taken off where it reaches into the sum.
-    """
+    """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where sums can be
+    separated. A flash of which no frame there saw enough is not taken off."""
     holds = np.einsum("jfr,kfr->rjk", first, weights)  # what the sum for flash j holds of flash k
     known: Flags = np.asarray(first.any(axis=1))  # (flash, row)
-    unknown = np.abs(holds[:, 0, 1:]) * ~known.T[:, 1:]
-    kept: Flags = ~(unknown > MOST_LEFT).max(axis=1, initial=False)
     matrix = np.where(known.T[:, :, None], holds, np.eye(len(weights)))
     if dark:
         matrix[:, :, 0], matrix[:, 0, 0] = 0.0, 1.0
-    separable = np.abs(np.linalg.det(matrix)) > LEAST_DETERMINANT
+    separable: Flags = np.abs(np.linalg.det(matrix)) > LEAST_DETERMINANT
     matrix[~separable] = np.eye(len(weights))
     inverse = np.linalg.inv(matrix)
     own: Doubles = np.einsum("rj,jfr->fr", inverse[:, 0, :], first)
-    return own, kept & separable
+    return own, separable
