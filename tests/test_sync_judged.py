@@ -10,6 +10,7 @@ import pytest
 
 from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.plan import Plan
+from psvideo.model.rows.clipping import SATURATED
 from psvideo.model.srgb import srgb_share
 from psvideo.model.swing import Swing
 from psvideo.model.timing import Timing
@@ -279,6 +280,44 @@ def swinging(plan: Plan, seed: int) -> np.ndarray:
     shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
     profiles: np.ndarray = shot.frames.mean(axis=2, dtype=np.float64)
     return profiles
+
+
+def clipping(plan: Plan, light: np.ndarray, *, flicker: float = 0.0) -> Timing:
+    """Return the timing of a scene (slot, row, column) whose brighter pixels clip."""
+    rng = np.random.default_rng(5)
+
+    def plate_of(flash: TrueFlash) -> np.ndarray:
+        lit = light[flash.slot] if flash.slot in plan.lit_slots else np.zeros((ROWS, COLUMNS))
+        return np.asarray(lit * (1 + flicker * rng.standard_normal()), np.float32)
+
+    shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
+    clipped = np.asarray(shot.frames >= SATURATED)
+    assert clipped.mean() > 0.01
+    profiles = shot.frames.mean(axis=2, dtype=np.float64)
+    return timing_from_rows(plan, np.arange(FRAMES), profiles, doubt=clipped.mean(axis=2))
+
+
+@pytest.mark.parametrize("over", [1.2, 1.6])
+@pytest.mark.parametrize("card", [COLUMNS // 4, COLUMNS])
+def test_light_that_clips_is_not_taken_for_lamps_that_flicker_or_flash_together(
+    plan: Plan, over: float, card: int
+) -> None:
+    """Of a white card that clips, flashes that two frames split show all, and whole ones do not: drivers and wiring
+    were to be checked."""
+    light = np.full((len(plan.flashes), ROWS, COLUMNS), 0.25)
+    light[:, :, :card] = over * np.linspace(0.95, 1.05, len(plan.flashes))[:, None, None]
+    timing = clipping(plan, light)
+    assert timing.swing is None
+    assert not any("flash together" in note for note in timing.notes)
+
+
+def test_lamps_that_flicker_are_named_where_highlights_clip(plan: Plan) -> None:
+    light = 0.2 + 0.4 * np.random.default_rng(6).random((len(plan.flashes), ROWS, COLUMNS))
+    light[:, : ROWS // 2, 3] = 2.0
+    swing = clipping(plan, light, flicker=0.06).swing
+    assert swing is not None
+    assert swing.cause == "lamps"
+    assert 0.1 < swing.share < 0.4
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -16,6 +16,9 @@ from psvideo.sync.rowfit.beat import Beat, train_between
 WORTH_A_THREAD = 40_000
 """Samples of one part of the work; with fewer, starting a thread costs more than it saves."""
 
+HIDDEN = 0.01
+"""Clipped pixels that may hide this share of what a row changes by halve what its sample counts for."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Profiles:
@@ -121,6 +124,15 @@ class Profiles:
         spread = self.value.std(axis=0)
         held: Doubles = np.maximum(spread, 1e-3 * spread.max() + 1e-12)
         return held
+
+    @property
+    def unclipped(self) -> Doubles:
+        """How far each sample shows the light that fell, shape (frame, row): 1 where no pixel clips, and the less the
+        more clipped ones may hide of what its row usually changes by."""
+        if self.doubt is None:
+            return np.ones_like(self.value)
+        share: Doubles = 1.0 / (1.0 + (self.doubt / (HIDDEN * self.spread)) ** 2)
+        return share
 
     @property
     def ends_s(self) -> Doubles:

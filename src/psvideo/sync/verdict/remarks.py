@@ -202,7 +202,8 @@ def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) ->
     """
     lit = plan.lit_slots
     drive_s = np.array([sum(plan.flashes[slot].lights.values()) * plan.flashes[slot].duration_s for slot in lit])
-    light = brightnesses(plan, found.rows.one_window(), beat)[:, 1 : len(lit) + 1] / drive_s
+    rows = found.rows.one_window()
+    light = brightnesses(plan, rows, beat, rows.unclipped)[:, 1 : len(lit) + 1] / drive_s
     level = light.mean(axis=0)
     if level.min() < -UNFIRED * level.max():
         return ()  # no flash takes light away: the names are wrong, and not the lights

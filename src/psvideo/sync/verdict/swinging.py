@@ -52,7 +52,7 @@ TOGETHER = 512
 @dataclass(frozen=True, kw_only=True)
 class _Seen:
     """What a clip shows, and what a fit without gains expects: ``value``, ``expected`` and ``trust``, (frame, row),
-    and every row's brightnesses, ``light`` (row, unknown)."""
+    and every row's brightnesses, ``light`` (row, unknown), fitted to what is ``unclipped`` (frame, row)."""
 
     plan: Plan
     rows: Profiles
@@ -60,6 +60,7 @@ class _Seen:
     light: Doubles
     expected: Doubles
     trust: Doubles
+    unclipped: Doubles
 
     @property
     def change(self) -> Doubles:
@@ -81,7 +82,7 @@ class _Seen:
     def fitted_to(self, value: Doubles) -> "_Seen":
         """Return the same profiles beside what brightnesses that are fitted to others (frame, row) expect of them."""
         beat = self.found.fit.beat
-        light = brightnesses(self.plan, replace(self.rows, value=value).one_window(), beat)
+        light = brightnesses(self.plan, replace(self.rows, value=value).one_window(), beat, self.unclipped)
         return replace(self, light=light, expected=predictions(self.plan, self.rows, beat, light))
 
     def only_rows(self, rows: slice) -> "_Seen":
@@ -92,6 +93,7 @@ class _Seen:
             light=self.light[rows],
             expected=self.expected[:, rows],
             trust=self.trust[:, rows],
+            unclipped=self.unclipped[:, rows],
         )
 
 
@@ -166,11 +168,13 @@ def _abrupt(flashes: "_FlashGains") -> bool:
 
 
 def _seen(plan: Plan, found: ClipFit) -> _Seen:
-    rows = replace(found.rows, doubt=None)
+    rows, unclipped = replace(found.rows, doubt=None), found.rows.unclipped
     found = replace(found, fit=replace(found.fit, beat=replace(found.fit.beat, beat_hz=())))
-    trust = found.fit.weight / found.fit.weight.max(axis=0)
+    trust = unclipped * found.fit.weight / found.fit.weight.max(axis=0)
     nothing = np.zeros_like(rows.value)
-    without = _Seen(plan=plan, rows=rows, found=found, light=nothing[:0], expected=nothing, trust=trust)
+    without = _Seen(
+        plan=plan, rows=rows, found=found, light=nothing[:0], expected=nothing, trust=trust, unclipped=unclipped
+    )
     return without.fitted_to(rows.value)
 
 
