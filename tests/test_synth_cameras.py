@@ -131,6 +131,25 @@ def test_what_cannot_be_filmed_is_one_paragraph(tmp_path: Path, old: str, new: s
     assert not (tmp_path / "clip").exists()
 
 
+@pytest.mark.parametrize(
+    ("claimed", "said"), [("0.0079", "readout_s = -0.006"), ('"unknown"', 'readout_s = "unknown"')]
+)
+def test_what_the_plan_claims_of_the_first_camera_is_not_said_of_one_with_figures_of_its_own(
+    tmp_path: Path, claimed: str, said: str
+) -> None:
+    """A camera of 25 frames a second had a plan that said 120, and the first one's readout."""
+    scene, claims = tmp_path / "scene.toml", f"[plan]\nfps = 99\nreadout_s = {claimed}\n"
+    scene.write_text(SCENE.replace("frames = 24", "frames = 2").replace("dropped = [5]", "") + claims)
+    plans = {}
+    for name in ("B", "C"):
+        shoot(scene, tmp_path / name, camera=name)
+        plans[name] = (tmp_path / name / "plan.toml").read_text()
+    assert "fps = 99" in plans["B"]
+    assert f"readout_s = {claimed}" in plans["B"]
+    assert "fps = 125" in plans["C"]
+    assert said in plans["C"]
+
+
 def test_a_camera_that_the_scene_does_not_have_is_named_with_those_it_has(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE)

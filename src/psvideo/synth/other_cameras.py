@@ -68,9 +68,17 @@ def _seen_by(scene: Scene, other: OtherCameraTable) -> dict[str, Any]:
         "starts_s": scene.starts_s + other.starts_s,
         "frames": other.frames or scene.frames,
         "camera": data["camera"] | shutter | given,
+        "plan": data["plan"] | _not_claimed(scene, other),
         "strobe": data["strobe"] | {"clock_offset_ppm": offset_ppm, "phase_s": _phase_s(scene, other, offset_ppm)},
         "output": data["output"] | {"dropped": other.dropped},
     }
+
+
+def _not_claimed(scene: Scene, other: OtherCameraTable) -> dict[str, None]:
+    """Return what the plan is to claim no more: figures of the first camera, where the other one has its own. That
+    nothing is known of the readout holds for both."""
+    claims = {"fps": scene.plan.fps, "readout_s": scene.plan.readout_s}
+    return {key: None for key, said in claims.items() if getattr(other, key) is not None and said != "unknown"}
 
 
 def _phase_s(scene: Scene, other: OtherCameraTable, offset_ppm: float) -> float:
