@@ -282,8 +282,8 @@ def swinging(plan: Plan, seed: int) -> np.ndarray:
     return profiles
 
 
-def clipping(plan: Plan, light: np.ndarray, *, flicker: float = 0.0) -> Timing:
-    """Return the timing of a scene (slot, row, column) whose brighter pixels clip."""
+def clipping(plan: Plan, light: np.ndarray, *, flicker: float = 0.0, room: float = 0.0) -> Timing:
+    """Return the timing of a scene (slot, row, column) whose brighter pixels clip, in a room that is lit as well."""
     rng = np.random.default_rng(5)
 
     def plate_of(flash: TrueFlash) -> np.ndarray:
@@ -291,9 +291,10 @@ def clipping(plan: Plan, light: np.ndarray, *, flicker: float = 0.0) -> Timing:
         return np.asarray(lit * (1 + flicker * rng.standard_normal()), np.float32)
 
     shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
-    clipped = np.asarray(shot.frames >= SATURATED)
+    seen = np.minimum(shot.frames + room, 1.0)
+    clipped = np.asarray(seen >= SATURATED)
     assert clipped.mean() > 0.01
-    profiles = shot.frames.mean(axis=2, dtype=np.float64)
+    profiles = seen.mean(axis=2, dtype=np.float64)
     return timing_from_rows(plan, np.arange(FRAMES), profiles, doubt=clipped.mean(axis=2))
 
 
@@ -309,6 +310,25 @@ def test_light_that_clips_is_not_taken_for_lamps_that_flicker_or_flash_together(
     timing = clipping(plan, light)
     assert timing.swing is None
     assert not any("flash together" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(
+    ("over", "room", "words"),
+    [
+        (4.0, 0.0, "overexposed: pixels that clip make .* a smaller aperture"),
+        (6.0, 0.0, "overexposed: pixels that clip make .* a smaller aperture"),
+        (4.0, 1.5, "overexposed, most of it in all frames"),
+    ],
+)
+def test_a_clip_that_is_overexposed_by_far_is_not_said_to_need_more_light_or_another_plan(
+    plan: Plan, over: float, room: float, words: str
+) -> None:
+    """More light was advised, or the plan that the strobe had played, "4 lights and no dark slot"."""
+    light = over * (0.8 + 0.4 * np.random.default_rng(7).random((len(plan.flashes), ROWS, COLUMNS)))
+    with pytest.raises(NoStrobeError, match=words) as refused:
+        clipping(plan, light, room=room)
+    assert "brightly enough" not in str(refused.value)
+    assert "played another" not in str(refused.value)
 
 
 def test_lamps_that_flicker_are_named_where_highlights_clip(plan: Plan) -> None:

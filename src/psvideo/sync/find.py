@@ -26,6 +26,7 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.verdict.believed import Verdict, believed_fit
+from psvideo.sync.verdict.overexposed import overexposed
 from psvideo.sync.verdict.refusal import (
     clock_too_far,
     in_step_with_frames,
@@ -130,7 +131,7 @@ def _refuse_where_others_fit(plan: Plan, verdict: Verdict, clip: str) -> None:
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
     if shows_the_same(plan, found.rows, found.fit.beat):
         return f"{clip}: {in_step_with_frames(plan)}"
-    reason = why_not(plan, rows) or clock_too_far(plan, found)
+    reason = overexposed(rows) or why_not(plan, rows) or clock_too_far(plan, found)
     explained = f"explains {100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
     if found.steps:
         explained = (

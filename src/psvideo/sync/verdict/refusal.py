@@ -11,6 +11,7 @@ from psvideo.sync.rowfit.coarse.search import GridPlace, search
 from psvideo.sync.rowfit.coarse.seed import SEARCH_ROWS, first_guess, gain_of
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.verdict.overexposed import overexposed_throughout
 from psvideo.sync.verdict.rivals import CLEARLY, Rival, best_rival, count_rivals, likely_rates, strobe_rivals
 
 ALIKE = 0.2
@@ -62,12 +63,12 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
         )
     changes = _changes(plan, rows)
     if float(np.abs(changes).max()) < 1e-9:
-        return (
+        return overexposed_throughout(rows) or (
             "no strobe like the plan's was found in the picture: its rows do not change at all from frame to frame. "
             "Check that the lights flashed, that the lens was open, and that this is the right clip."
         )
     if _likeness(changes) < NOISE:
-        return (
+        return overexposed_throughout(rows) or (
             "no strobe like the plan's was found in the picture: what changes from frame to frame is noise, which "
             f"neighbouring rows do not share (mean level {float(rows.value.mean()):.2g} of saturation). Check that the "
             "lights flashed and are bright enough; open the lens or raise the gain."
