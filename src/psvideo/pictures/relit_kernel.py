@@ -51,6 +51,7 @@ def _relit(
     share = np.float32(1.0) / np.float32(factor * factor)
     cols = out.shape[1] * factor
     facing, total = np.empty(cols, np.float32), np.empty((3, cols), np.float32)
+    sums, packed = np.empty(cols, np.float32), np.empty((3, cols), np.uint16)
     for row in range(out.shape[0]):
         total[:] = np.float32(0)
         for i in range(row * factor, (row + 1) * factor):
@@ -59,11 +60,10 @@ def _relit(
             _add(greens[i], facing, total[1])
             _add(blues[i], facing, total[2])
         for channel in range(3):
-            for col in range(out.shape[1]):
-                light_of = np.float32(0)
-                for j in range(col * factor, (col + 1) * factor):
-                    light_of += total[channel, j]
-                out[row, col, channel] = encoded(light_of, out)
+            _pack_beside(total[channel], factor, sums, packed[channel])
+        for col in range(out.shape[1]):
+            for channel in range(3):
+                out[row, col, channel] = packed[channel, col * factor]
 
 
 @FUSED.kept
@@ -82,3 +82,18 @@ def _face(xs: Codes16, ys: Codes16, zs: Codes16, x: np.float32, y: np.float32, z
 def _add(albedo: Codes16, facing: Floats, total: Floats) -> None:
     for col in range(facing.shape[0]):
         total[col] += decoded(albedo[col]) * facing[col]
+
+
+@FUSED.inlined
+def _pack_beside(line: Floats, factor: int, sums: Floats, packed: Codes16) -> None:
+    """Fill ``packed`` with what so many samples from there on are together, from every one that has as many: one of so
+    many is wanted, but loops over neighbours become vectors. ``sums`` is room for a row."""
+    count = line.shape[0] - factor + 1
+    for col in range(count):
+        sums[col] = line[col]
+    for beside in range(1, factor):
+        ahead = line[beside : beside + count]
+        for col in range(count):
+            sums[col] += ahead[col]
+    for col in range(count):
+        packed[col] = encoded(sums[col], packed)
