@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.robust.reflectance import ROWS, points_at
 from psvideo.solve.normals.trust.slope_pairs import LEAST_PAIRS, SlopePairs, of_place, robustly
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, turned_unseen
@@ -24,6 +27,12 @@ the lens, take it for a normal that leans to that axis. (Rings of 4, 6 and 8 lig
 photographs' lights: 7.7 and 3.7 half of the time.)"""
 ONE_STRENGTH = 0.02
 """Lamps whose strengths differ by less than this share of their mean are alike."""
+FOLLOWED = 0.2
+"""Normals that lie farther from what least squares gives than this share of what albedo says follow the subject's
+model, which explains such albedo. (Balls of clay 0.3 to 1.1; waves of clay, where a model is found and hardly followed,
+0.)"""
+LOOKED_AT = 1000
+"""That is looked at in so many points."""
 SURE = 3.0
 """Of light that all lamps add counts what is more than so many standard errors."""
 
@@ -55,22 +64,49 @@ def added_unseen(lit: Illumination) -> tuple[Added, ...]:
     return tuple(found)
 
 
-def turned_by_added_deg(points: ThinSurface, pairs: SlopePairs, added: Sequence[Added]) -> Floats:
+def turned_by_added_deg(
+    points: ThinSurface, pairs: SlopePairs, added: Sequence[Added], *, modelled_deg: float = 0.0
+) -> Floats:
     """Return by how many degrees light turns every normal that all lamps add alike, (row, col): as much of it as makes
     albedo differ as it does, of the kind that turns it most. It stretches normals that lean to its vector, and turns
-    those that do not. Light that is missing makes albedo go the other way; where normals follow a model of the
-    subject, that explains such albedo."""
+    those that do not. Light that is missing makes albedo go the other way; where a model of the subject turned normals
+    by ``modelled_deg``, it explains such albedo."""
     most = np.zeros(points.known.shape, np.float32)
-    misfit = points.surface.misfit
-    modelled = misfit is not None and misfit.reflectance is not None
     for unseen, vector in added:
         much = _surely(pairs, (pairs.there - pairs.here) @ vector)
-        if modelled and much < 0:
-            continue
         along = np.tensordot(vector.astype(np.float32), points.planes, axes=1)
         across = np.sqrt(np.maximum(np.float32(vector @ vector) - along * along, np.float32(0)))
-        most = np.maximum(most, np.degrees(np.float32(unseen * abs(much))) * across)
+        turned = np.degrees(np.float32(unseen * abs(much))) * across
+        if much < 0 and modelled_deg:
+            said = FOLLOWED * median(turned[points.known])
+            turned *= np.float32(max(1 - modelled_deg / max(said, 1e-6), 0.0))
+        most = np.maximum(most, turned)
     return np.asarray(most, np.float32)
+
+
+def modelled_deg(points: ThinSurface, one: Evidence, known: Mask) -> float:
+    """Return by how many degrees a model of the subject turned typical normals from what least squares gives, where all
+    lamps shine on ``known`` points (row, col); 0 where there is no model, or nothing to compare with."""
+    misfit = points.surface.misfit
+    if misfit is None or misfit.reflectance is None or not known.any():
+        return 0.0
+    rows = np.flatnonzero(known.any(axis=1))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, ROWS).astype(np.intp))]
+    where, cols = np.nonzero(known[rows])
+    chosen = np.linspace(0, len(where) - 1, min(LOOKED_AT, len(where))).astype(np.intp)
+    here = rows[where[chosen]], cols[chosen]
+    found = points_at(
+        one.plates, one.lit, (here[0] * points.step, here[1] * points.step), one.usable,
+        points.surface.normals[here].astype(np.float64),
+        seen=one.seen, black_level=one.black_level, scale=one.scale,
+    )  # fmt: skip
+    lit = found.counts.all(axis=0)
+    if not lit.any():
+        return 0.0
+    towards, measured = np.moveaxis(found.towards[:, lit], 1, 0), found.measured[:, lit].T
+    plain = (np.linalg.pinv(towards) @ measured[..., None])[..., 0]
+    cosines = (plain * found.normals[lit]).sum(axis=1) / np.maximum(np.linalg.norm(plain, axis=1), 1e-12)
+    return float(np.degrees(median(np.arccos(np.clip(cosines, -1, 1)))))
 
 
 def _surely(pairs: SlopePairs, stretches: Doubles) -> float:

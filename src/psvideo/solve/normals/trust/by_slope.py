@@ -49,12 +49,19 @@ as many degrees as the second number counts half, and nothing counts more: such 
 
 
 def by_slope_deg(
-    points: ThinSurface, lit: Illumination, known: Mask, *, unseen: float = 1.0, added: Sequence[Added] = ()
+    points: ThinSurface,
+    lit: Illumination,
+    known: Mask,
+    *,
+    unseen: float = 1.0,
+    added: Sequence[Added] = (),
+    modelled_deg: float = 0.0,
 ) -> Floats:
     """Return by how many degrees normals are turned, as far as albedo that goes with the slope shows it, (row, col) of
     the points, of which these ``known`` speak for the subject; zeros where too few of them are in the light of all
     lamps. What turns normals counts as far as residuals leave it ``unseen`` (``unchecked.py``), or light that all lamps
-    ``added`` alike (``added_light.py``), where that is more."""
+    ``added`` alike (``added_light.py``), where that is more; a model of the subject turned normals by
+    ``modelled_deg``."""
     normals, albedo, whole = averaged(points, known)
     bright = in_light_of_all(normals, albedo, lit, whole)
     pairs = pairs_of(normals, albedo, bright)
@@ -65,7 +72,7 @@ def by_slope_deg(
         typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs, lit)))
         shown = typical_deg * _turned_beside_stretched(points, lit, known, bright)
     if added:
-        shown = np.maximum(shown, turned_by_added_deg(points, pairs, added))
+        shown = np.maximum(shown, turned_by_added_deg(points, pairs, added, modelled_deg=modelled_deg))
     shown = np.sqrt(np.maximum(shown**2 - (np.float32(OF_NOISE) * points.noise_deg) ** 2, 0))
     return np.asarray(shown / (1 + shown / np.float32(LARGEST_DEG)), np.float32)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.trust.added_light import Added, added_unseen
+from psvideo.solve.normals.trust.added_light import Added, added_unseen, modelled_deg
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
@@ -121,6 +121,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     unseen, added = 0.0, tuple[Added, ...]()
     if by_slope and not one.moved:  # what was not followed goes with it too
         unseen, added = unseen_share(one.lit), added_unseen(one.lit)
+    turned_by_it_deg = modelled_deg(points, one, still) if added else 0.0
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -135,7 +136,9 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
         torn_share=torn_share(points, one.lit),
-        by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, added=added) if unseen or added else 0.0,
+        by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, added=added, modelled_deg=turned_by_it_deg)
+        if unseen or added
+        else 0.0,
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
         shadows_deg=np.float32(unseen) * shadows_deg(points, one.lit, still) if unseen else 0.0,
     )
