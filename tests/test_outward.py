@@ -66,7 +66,8 @@ def solved(shape: tuple[Array, Mask], ways: Array, claimed: Array) -> tuple[list
 
 
 def found_of(plates: list[NDArray[np.float32]], surface: Surface, subject: Mask) -> float | None:
-    return outward(thin_surface(surface), thinned(subject), thinned(np.max(plates, axis=0)))
+    found = outward(thin_surface(surface), thinned(subject), thinned(np.max(plates, axis=0)))
+    return None if found is None else found.cosine
 
 
 def facing(shape: tuple[Array, Mask], ways: Array, claimed: Array) -> float | None:
@@ -147,6 +148,25 @@ def test_a_bowl_is_not_called_wrong_and_a_guessed_order_is_what_is_blamed() -> N
     assert hollow.grade == "doubtful"
     assert "hollow" in hollow.found
     assert "order of the lights is a guess" in guessed.found
+
+
+def beside() -> tuple[Array, Mask]:
+    """A bowl, and a ball that is as large."""
+    across, up, sign = (X - 0.5 * np.sign(X)) / 0.45, Y / 0.45, np.sign(X)
+    inside = np.hypot(across, up) < 0.97
+    height = np.sqrt(np.where(inside, 1 - across**2 - up**2, 1))
+    return of_slopes(-sign * across / height, -sign * up / height), inside
+
+
+@pytest.mark.parametrize("lights", [3, 5])
+def test_a_bowl_beside_a_ball_is_not_called_a_wrong_rig_and_a_wrong_rig_is(lights: int) -> None:
+    """Half of the outline faced inwards: two lights were to be exchanged, and the take was not usable."""
+    ways = ring(lights, 30)
+    right, mirrored = (said_of(beside(), ways, claimed) for claimed in (ways, ways * [-1, 1, 1]))
+    assert right.grade == "doubtful"
+    assert "a part of it is hollow" in right.found
+    assert mirrored.grade == "bad"
+    assert "exchanged" in mirrored.found
 
 
 def test_a_bowl_under_a_guessed_order_that_is_right_is_doubted_and_not_called_wrong() -> None:

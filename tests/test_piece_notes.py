@@ -15,6 +15,7 @@ from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.outward import Facing
 from psvideo.report.observe.rig_and_curve.rigpoints import PointLight
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -48,6 +49,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
             blurs_px=[0.7],
             noises=[AgainstNoise(level=1 / 3, read=1e-6, photon=2 / 3)],
             leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
+            outward=[Facing(cosine=1 / 3, apart=0.1)],
             in_shadow=[0.04],
         ),
         light_at_points=[PointLight(np.random.default_rng(1).random((4, 2)), np.array([1.0, 4.0]))],
@@ -71,7 +73,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
 
 def test_every_number_that_was_noted_of_a_round_comes_back_and_follows_those_before(tmp_path: Path) -> None:
     names = [one.name for one in fields(CloseLooks) if one.type == list[float]]
-    assert {"slopes", "away", "outward", "in_shadow"} <= set(names)
+    assert {"slopes", "away", "in_shadow"} <= set(names)
     one = Observed(lights=("a",))
     for n, name in enumerate(names):
         getattr(one.closely, name).append(0.25 + n)

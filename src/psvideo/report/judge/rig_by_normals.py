@@ -47,6 +47,11 @@ FLAT = (
 )
 OR_STRENGTHS = " Under three lights other strengths than the rig's, or two lights exchanged, may do the same."
 TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
+BOTH_WAYS = 0.6
+"""Where hollows lie beside what stands free, normals at outlines that run alike face outwards or inwards: the variance
+of their cosines is more than this share of that of 1 and -1 with the same mean (a bowl and a ball: 0.69 to 1). A wrong
+rig turns alike normals alike: of a ball, a cone, a cushion and a ring 0 to 0.47, of bowl and ball 0.4 to 0.5, on
+photographs of a cat, a horse and a ball 0.01 to 0.3."""
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
@@ -118,6 +123,8 @@ def facing_inwards(observed: Observed, *, guessed: bool) -> Judgement | None:
         return None
     inwards = "Normals do not face outwards where the subject ends, as those of a body that stands free do"
     hollow = facing < INSIDE_OUT
+    if not hollow and _both_ways(observed):
+        return _partly_hollow(observed, guessed=guessed)
     if guessed:
         return Judgement(
             subject="rig",
@@ -145,6 +152,22 @@ def facing_inwards(observed: Observed, *, guessed: bool) -> Judgement | None:
     )
 
 
+def _partly_hollow(observed: Observed, *, guessed: bool) -> Judgement:
+    """Say that outlines which run alike have normals of both kinds: no rig makes those of one kind of body."""
+    unsure = "whether the order of the lights, a guess, is right" if guessed else "whether the rig is right"
+    return Judgement(
+        subject="rig",
+        grade="doubtful",
+        found="Where the subject ends some normals face outwards, and others inwards where the outline runs alike: a "
+        f"part of it is hollow, as a bowl is, or has holes. So outlines do not tell {unsure}."
+        f"{_as_it_is_seen(observed)}",
+        advice="If nothing in the picture is hollow, check that the rig file is in camera axes (x right, y up), and "
+        "names the lights as the plan does."
+        if not guessed
+        else "If nothing in the picture is hollow, try the other lights as `first_light`, one after the other.",
+    )
+
+
 def faces_outwards(observed: Observed) -> bool:
     """Return whether normals are known to face outwards where the subject ends."""
     facing = _facing(observed)
@@ -152,7 +175,14 @@ def faces_outwards(observed: Observed) -> bool:
 
 
 def _facing(observed: Observed) -> float | None:
-    return float(np.median(observed.closely.outward)) if observed.closely.outward else None
+    cosines = [one.cosine for one in observed.closely.outward]
+    return float(np.median(cosines)) if cosines else None
+
+
+def _both_ways(observed: Observed) -> bool:
+    """Return whether normals face outwards and inwards at outlines that run alike."""
+    shares = [one.apart**2 / max(1 - one.cosine**2, 1e-9) for one in observed.closely.outward]
+    return bool(np.median(shares) > BOTH_WAYS)
 
 
 def facing_away(observed: Observed) -> Judgement | None:

@@ -9,7 +9,7 @@ from psvideo.report.observe.against_noise import AgainstNoise, against_noise
 from psvideo.report.observe.alignment.astray import Astray
 from psvideo.report.observe.facts import Seen
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
-from psvideo.report.observe.rig_and_curve.outward import outward
+from psvideo.report.observe.rig_and_curve.outward import Facing, outward
 from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
 from psvideo.report.observe.rig_and_curve.slopes import Averaged, coarse_normals, share_away, surface_agreement
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
@@ -23,15 +23,15 @@ class CloseLooks:
 
     ``blurs_px`` are of the sharpest edges; ``noises`` how far the subject's light stands out of the plates' noise;
     ``slopes`` how far normals are one surface's, ``away`` which share of them faces away from the camera, ``outward``
-    how far they face outwards at the outline; ``leans`` how far the rig seems to be turned; ``in_shadow`` which share
-    of a lamp's light is left where it cannot reach; ``astray`` by how far photographs lie apart.
+    how they face at the outline; ``leans`` how far the rig seems to be turned; ``in_shadow`` which share of a lamp's
+    light is left where it cannot reach; ``astray`` by how far photographs lie apart.
     """
 
     blurs_px: list[float] = field(default_factory=list)
     noises: list[AgainstNoise] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     away: list[float] = field(default_factory=list)
-    outward: list[float] = field(default_factory=list)
+    outward: list[Facing] = field(default_factory=list)
     leans: list[Lean] = field(default_factory=list)
     in_shadow: list[float] = field(default_factory=list)
     astray: list[Astray] = field(default_factory=list)

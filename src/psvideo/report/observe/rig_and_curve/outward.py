@@ -6,6 +6,8 @@ body (K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding 
 one surface: a ball becomes a saddle, which three lights explain as well.
 """
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +28,25 @@ BEYOND, DARKER = 4.0, 0.5
 """So many points beyond the outline there is less than this share of the light in it: else a mask cuts the subject."""
 ALL_AROUND = 0.7
 """Outlines that face one way tell little: their mean direction is shorter than this."""
+SECTORS = 12
+"""Ways out are compared with others of the same sector, 30 degrees wide: within one, the cosines of a ball that lights
+make a saddle differ by 0.3 at most."""
 
 
-def outward(some: Surface, subject: NDArray[np.bool_], light: NDArray[np.float32]) -> float | None:
-    """Return the mean cosine between steep normals at the subject's outline and the way out: 1 for a body that stands
-    free, about 0 under lights that are exchanged, -1 for a bowl. None where too little of an outline shows.
+@dataclass(frozen=True, kw_only=True)
+class Facing:
+    """How normals at a subject's outline face: the mean cosine between them and the way out, and by how much cosines
+    differ (a standard deviation) where the way out is the same."""
+
+    cosine: float
+    apart: float
+
+
+def outward(some: Surface, subject: NDArray[np.bool_], light: NDArray[np.float32]) -> Facing | None:
+    """Return how steep normals at the subject's outline face. The mean cosine to the way out is 1 for a body that
+    stands free, about 0 under lights that are exchanged, -1 for a bowl. A rig that is wrong turns normals that were
+    alike alike, so that those of one way out still are; a bowl beside a body has both there, 1 apart at most. None
+    where too little of an outline shows.
 
     some: a surface, thinned as the ``subject`` (row, col) is, and the brightest ``light`` of any lamp (row, col). Where
     the picture ends the subject does not.
@@ -47,7 +63,16 @@ def outward(some: Surface, subject: NDArray[np.bool_], light: NDArray[np.float32
     ways = np.stack([right[at], up[at]]) / slope[at]
     if np.hypot(*ways.mean(axis=1)) > ALL_AROUND:
         return None
-    return float((ways * normals[at][:, :2].T / leaning[at]).sum(axis=0).mean())
+    cosines = (ways * normals[at][:, :2].T / leaning[at]).sum(axis=0)
+    return Facing(cosine=float(cosines.mean()), apart=_apart(cosines, ways))
+
+
+def _apart(cosines: Doubles | Floats, ways: Doubles | Floats) -> float:
+    """Return by how much cosines (point,) differ among ways out (2, point) of the same sector."""
+    sector = np.floor((np.arctan2(ways[1], ways[0]) / (2 * np.pi) + 0.5) * SECTORS).astype(np.intp) % SECTORS
+    count = np.bincount(sector, minlength=SECTORS)
+    means = np.bincount(sector, weights=cosines, minlength=SECTORS) / np.maximum(count, 1)
+    return float(np.sqrt(np.mean((cosines - means[sector]) ** 2)))
 
 
 def _ends(
