@@ -28,6 +28,7 @@ from psvideo.report.judge import of_accuracy
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_timing import timing_and_order
+from psvideo.report.judge.of_validity import first_of_all
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import verdict_of
@@ -105,6 +106,17 @@ def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_s
     assert verdict_of([line, *rig_of(dead), *validity(dead)]) == "This take is usable, with reservations."
     wrong = Footage(shape="waves", lights=6, gains=[1, 1, 0, 1, 1, 1], claimed_deg=40, solved=True).observed(0)
     assert graded(rig_but_leaning(wrong), "rig") in ("doubtful", "bad")
+
+
+def test_where_the_other_lights_lie_in_one_plane_that_is_said_and_not_that_normals_come_from_them() -> None:
+    """Of five lights the two above and below were dead: more light was advised, and no normal was trusted."""
+    dead = Footage(lights=6, gains=[1, 1, 0, 1, 1, 1], solved=True).observed(0)
+    assert dead.points is not None
+    dead.points = replace(dead.points, vectors=dead.points.vectors * [1, 0, 1])
+    (line,) = lamps(dead)
+    assert line.grade == "bad"
+    assert "the other 5 lie in one plane" in line.found
+    assert "line on lights first" in first_of_all((line,))
 
 
 def test_many_dead_lights_are_one_line() -> None:

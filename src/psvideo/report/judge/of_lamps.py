@@ -14,6 +14,7 @@ from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import TARGET_QUANTILE
 from psvideo.report.observe.observed import Observed
+from psvideo.solve.normals.illumination import MAX_CONDITION
 
 WEAK_LIGHT = 1 / 8
 """Of the brightest lamp's light."""
@@ -39,7 +40,9 @@ def lamps(
     relative = usual / max(float(usual.max()), 1e-12)
     known = _shown(observed)
     named = [light for light, is_known in zip(observed.lights, known, strict=True) if is_known]
-    said = list(_weak(named, relative[known], _brightest(observed)[known], _claimed(observed)[known], missed=missed))
+    flat = _in_a_plane(observed)
+    shown_as = _brightest(observed)[known], _claimed(observed)[known]
+    said = list(_weak(named, relative[known], *shown_as, missed=missed, flat=flat))
     alive = observed.firing
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():
@@ -68,6 +71,16 @@ def weaker_than_rig(observed: Observed) -> tuple[str, ...]:
     return tuple(
         light for light, so, seen in zip(observed.lights, weaker, _shown(observed), strict=True) if so and seen
     )
+
+
+def _in_a_plane(observed: Observed) -> bool:
+    """Return whether the lights that fire lie so nearly in one plane that nothing is solved with them."""
+    if observed.points is None or int(observed.firing.sum()) < LEAST_LIGHTS:
+        return False
+    ways = observed.points.vectors[:, observed.firing].mean(axis=0)
+    lengths = np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
+    sizes = np.linalg.svd(ways / lengths, compute_uv=False)
+    return bool(sizes[0] > MAX_CONDITION * sizes[-1])
 
 
 def _known(observed: Observed) -> list[InstantFacts]:
@@ -134,6 +147,7 @@ def _weak(
     claimed: NDArray[np.float64],
     *,
     missed: bool = False,
+    flat: bool = False,
 ) -> Iterator[Judgement]:
     """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
     dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
@@ -151,7 +165,7 @@ def _weak(
     others = int((relative >= NOT_FIRING).sum())
     dead = [(light, share) for light, share in zip(lights, relative, strict=True) if share < NOT_FIRING]
     if dead:
-        yield _no_light(dead, others=others, missed=missed)
+        yield _no_light(dead, others=others, missed=missed, flat=flat)
     weaker = _weaker(relative, brightest, claimed)
     for light, share, is_dim, is_weaker, says in zip(lights, relative, dim, weaker, claimed, strict=True):
         if is_weaker:
@@ -176,9 +190,13 @@ def _weaker_than_rig(light: str, share: float, says: float, *, lights: int) -> J
     )
 
 
-def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool) -> Judgement:
-    """Say which lamps do not fire, which is bad where too few others do; ``missed``: rows see them in no round."""
+def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool, flat: bool) -> Judgement:
+    """Say which lamps do not fire, which is bad where too few others do, or those lie in one plane (``flat``);
+    ``missed``: rows see them in no round."""
     enough = others >= LEAST_LIGHTS
+    rest = f"; normals come from the other {others}." if enough else "."
+    if flat:
+        rest = f"; the other {others} lie in one plane with the subject, across which nothing shows how normals stand."
     named = listed([repr(light) for light, _ in dead], NAMED)
     most = f"{100 * max(0.0, *(share for _, share in dead)):.1f} % of the strongest"
     one = len(dead) == 1
@@ -187,8 +205,8 @@ def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool) -
         what = f"{len(dead)} lights give no light ({named}; at most {most})"
     return Judgement(
         subject="lights",
-        grade="doubtful" if enough else "bad",
-        found=what + (f"; normals come from the other {others}." if enough else "."),
+        grade="doubtful" if enough and not flat else "bad",
+        found=what + rest,
         advice="Take the strobe out of step with the frames (see the line on rows): "
         f"{'it' if one else 'they'} may flash while the shutter is closed."
         if missed

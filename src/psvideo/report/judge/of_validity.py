@@ -32,6 +32,7 @@ CLIPPING_FIRST = (
 )
 EXPOSURE_FIRST = "See the line on exposure first: noise alone may turn normals that far."
 RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
+LIGHTS_FIRST = "See the line on lights first: what it names costs normals."
 CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
 
 
@@ -41,6 +42,8 @@ def first_of_all(lines: Sequence[Judgement], *, curve_doubted: bool = False) -> 
     doubted = {one.subject for one in lines if one.grade in ("doubtful", "bad")}
     if curve_doubted:
         return CURVE_FIRST
+    if any(one.subject == "lights" and one.grade == "bad" for one in lines):
+        return LIGHTS_FIRST
     if "exposure" in doubted:
         return EXPOSURE_FIRST
     if "clipping" in doubted:
