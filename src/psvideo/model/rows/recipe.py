@@ -26,8 +26,8 @@ WHOLE = 1.0 - 1e-9
 """A row that saw this share of a square flash saw all of it."""
 WHOLE_BUT_TAIL = 1.0 - 1e-3
 """A row that saw this share of a flash with tails, which never quite end, saw all of it."""
-LEAST_SHARE = 0.05
-"""A row that saw less of a flash than this is unseen: dividing by so little would bring up only noise."""
+LEAST_SHARE = 0.12
+"""A row that saw less of a flash than this is unseen: dividing by it brings up noise, and another round may show it."""
 LEAST_PART = 1e-3
 """A frame's row that saw less of a flash than this takes no part in its sum: tails never quite end."""
 NO_FOREIGN = 1e-5
