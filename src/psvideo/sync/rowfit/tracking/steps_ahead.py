@@ -15,6 +15,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 from psvideo.sync.rowfit.tracking.misfires import losses_but_for_misfires
+from psvideo.sync.rowfit.tracking.missing_instead import rather_missing
 
 BLOCK = 16
 """Frames that are looked for at a time."""
@@ -82,6 +83,13 @@ def steps_ahead(
         same = same.but(same.lit & _as_planned(rows, block, ahead.value - predictions(plan, ahead, beat, light), sign))
         same = same._replace(lit=same.lit & due(plan, ahead, beat, sign))
     course = _cheapest(table[::sign], same.turned(sign), sign)[::sign]
+    course = rather_missing(
+        course,
+        table,
+        LEAST,
+        lambda one: _left(plan, rows, beat, _span(rows, known, block, sign), block, one, sign),
+        sign,
+    )
     again = _repeats_alone(course[::sign], same.turned(sign), sign)
     if course.any() and not again and not _holds(plan, rows, beat, known, block, course, sign):
         course = np.zeros(len(loss), np.int64)
@@ -142,15 +150,22 @@ def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, c
 
     Frames that move are predicted badly; fitted along a wrong course they stay bad, along the right one they do not.
     """
-    count = len(rows.value)
-    span = (
-        slice(known.start, min(block.stop + BLOCK, count))
-        if sign > 0
-        else slice(max(block.start - BLOCK, 0), known.stop)
-    )
-    stayed, went = rows.take(span), replace(rows, index=with_steps(rows.index, block, course, sign)).take(span)
-    gain = frame_losses(stayed, unexplained(plan, stayed, beat)) - frame_losses(went, unexplained(plan, went, beat))
-    return float(gain.sum()) > HOLDS
+    span = _span(rows, known, block, sign)
+    stayed = _left(plan, rows, beat, span, block, np.zeros_like(course), sign)
+    return stayed - _left(plan, rows, beat, span, block, course, sign) > HOLDS
+
+
+def _span(rows: Profiles, known: slice, block: slice, sign: int) -> slice:
+    """Return the known frames, those of a block and as many beyond it."""
+    if sign > 0:
+        return slice(known.start, min(block.stop + BLOCK, len(rows.value)))
+    return slice(max(block.start - BLOCK, 0), known.stop)
+
+
+def _left(plan: Plan, rows: Profiles, beat: Beat, span: slice, block: slice, course: Integers, sign: int) -> float:
+    """Return how badly frames fit along a course when brightnesses are fitted again to all of them."""
+    went = replace(rows, index=with_steps(rows.index, block, course, sign)).take(span)
+    return float(frame_losses(went, unexplained(plan, went, beat)).sum())
 
 
 def _cheapest(table: Doubles, twins: Twins, sign: int) -> Integers:
