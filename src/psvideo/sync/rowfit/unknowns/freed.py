@@ -67,7 +67,7 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
     """
     first, known = fit, free
     refused: set[str] = set()
-    unsure_s, soft_s, wider_s = 0.0, 0.0, dict[str, float]()
+    unsure_s, hidden_s, soft_s, wider_s = 0.0, 0.0, 0.0, dict[str, float]()
     far = None if "exposure_s" in free else _far_exposure(plan, rows, fit)
     while True:
         names = tuple(name for name in _may_differ(plan) if name not in free and name not in refused)
@@ -76,7 +76,7 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
             break
         if set(more) <= set(TAILS):
             slow = _tails(plan, rows, fit, free, more)
-            tried, unsure_s, soft_s = slow.fit, float(np.hypot(unsure_s, slow.unsure_s)), max(soft_s, slow.soft_s)
+            tried, hidden_s, soft_s = slow.fit, float(np.hypot(hidden_s, slow.unsure_s)), max(soft_s, slow.soft_s)
             taken = tried is not fit
         else:
             tried = fitted(plan, rows, far or fit.beat, (*free, *more))
@@ -93,7 +93,9 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
         fit, free = tried, tuple(dict.fromkeys((*free, *tried.errors_s)))
     only_shutter = len(free) > len(known) and not set(TAILS) & set(free)
     if only_shutter and within_blur(rows, first.beat, fit.beat) and cleared(plan, rows, first, fit) < BELIEVED:
-        return Freed(fit=first, unsure_s=BLURRED * (soft_s or blurred_s(plan, rows, first)), soft_s=soft_s)
+        blur_s = BLURRED * (soft_s or blurred_s(plan, rows, first))
+        return Freed(fit=first, unsure_s=float(np.hypot(blur_s, hidden_s)), soft_s=soft_s)
+    unsure_s = float(np.hypot(unsure_s, hidden_s))
     if not (soft_s or set(TAILS) & set(free)):
         unsure_s = float(np.hypot(unsure_s, BLURRED * blurred_s(plan, rows, fit)))
     errors_s = {name: float(np.hypot(error_s, wider_s.get(name, 0.0))) for name, error_s in fit.errors_s.items()}
