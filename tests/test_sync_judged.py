@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.plan import Plan
@@ -640,3 +641,35 @@ def test_losses_of_square_pulses_are_those_of_any_pulses(lights: int, shutter: f
     sharp = losses(plan, rows, clocks, beat, place=rows.place)
     general = losses(plan, replace(rows, restless=np.full(9, 1e-300)), clocks, beat, place=rows.place)
     assert sharp == pytest.approx(general, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_clock_that_moving_rows_feign_is_not_believed_where_no_row_splits_a_flash(
+    make_plan: PlanMaker, seed: int
+) -> None:
+    """Flashes fell where no row opens or closes; a texture that moved through the rows made the strobe 1190 ppm slow,
+    its times 200 us off at a claim of 41, under a plan that allows 100."""
+    plan = make_plan(
+        height_px=ROWS, width_px=COLUMNS, lights=("a", "b", "c", "d"), fps=Fraction(120), shutter=0.9, readout=0.6
+    )
+    plan = replace(plan, dark_s=1.0003 * plan.camera.exposure_s, clock_tolerance_ppm=100.0)
+    texture = gaussian_filter(np.random.default_rng(seed).random((400, COLUMNS)), (4, 0))
+    texture = (texture - texture.min()) / np.ptp(texture)
+
+    def plate_of(flash: TrueFlash) -> np.ndarray:
+        moved = 100 + 24.0 * flash.start_s
+        there = texture[int(moved) : int(moved) + ROWS + 1]
+        seen = there[:-1] + (moved - int(moved)) * np.diff(there, axis=0)
+        shade = 0.65 + 0.35 * np.sin(3 * np.arange(ROWS) / ROWS + 1.7 * flash.slot)
+        return np.asarray((0.05 + 0.6 * seen) * shade[:, None])
+
+    clock = TrueClock(phase_s=0.007, offset_ppm=-26.0)
+    shot = expose(plate_of, plan, frames=30, clock=clock, noise=NOISE, bits=8)
+    try:
+        timing = timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64))
+    except NoStrobeError:
+        return
+    pitch_s = plan.cycle_s * (1 - 26e-6) / len(plan.flashes)
+    late_s = [(one.start_s - 0.007 + pitch_s / 2) % pitch_s - pitch_s / 2 for one in timing.flashes if one.complete]
+    assert timing.phase_error_s is not None
+    assert np.abs(late_s).max() < 3 * timing.phase_error_s

@@ -26,6 +26,7 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.verdict.believed import Verdict, believed_fit
+from psvideo.sync.verdict.elsewhere import rows_open_at_once
 from psvideo.sync.verdict.overexposed import overexposed
 from psvideo.sync.verdict.refusal import (
     clock_too_far,
@@ -125,7 +126,8 @@ def _refuse_unless_believed(plan: Plan, rows: Profiles, verdict: Verdict, clip: 
 
 def _refuse_where_others_fit(plan: Plan, verdict: Verdict, clip: str) -> None:
     if verdict.other is not None:
-        raise NoStrobeError(f"{clip}: {other_times_as_well(plan, verdict.found, verdict.other)}")
+        at_once = rows_open_at_once(plan, verdict.found.fit.beat)
+        raise NoStrobeError(f"{clip}: {other_times_as_well(plan, verdict.found, verdict.other, at_once=at_once)}")
 
 
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:

@@ -4,6 +4,9 @@ A rolling shutter shows in which direction a flash moves through the frame. Wher
 flash, all rows see the same: a flash that the exposure's end cuts more and more looks like one that its beginning cuts
 less and less, under a clock that is off the other way, and a strobe that keeps step with the frames looks the same at
 many places. Then the clock must tell, and where several are as likely, nothing does.
+
+Whatever the readout, a clock that is farther off than the plan says is believed only where none within the plan's
+tolerance explains the clip as well: a subject that moves past flashes that no row splits feigns any.
 """
 
 from collections.abc import Iterator
@@ -24,6 +27,8 @@ SHORT = 3.0
 """Rows open at nearly the same time where the readout is no longer than this many of the shortest flash."""
 ROWS, FRAMES = 12, 240
 """Rows, and frames in a row, among which other places are looked for; they are then fitted to all frames."""
+ROLLING_ROWS = 36
+"""Rows where they open one after another."""
 TRIED = 12
 """The best places of each search that are fitted."""
 NEAR, TURNS = (-0.6, -0.4, -0.25, 0.25, 0.4, 0.6), 21
@@ -44,26 +49,37 @@ PLACES = 7
 
 def fits_elsewhere(plan: Plan, found: ClipFit) -> Beat | None:
     """Return a beat whose flashes come at other times than those of a fit and explain the clip as well, under a clock
-    that the plan allows or a misnamed frame rate makes; None where there is none, or rows open one after another.
+    that the plan allows or a misnamed frame rate makes; None where there is none. Where rows open one after another it
+    is looked for only if the fit's clock is none of these.
 
     Shutter and readout are the fit's, or the plan's where those were moved away from it.
     """
-    beat, rows = found.fit.beat, found.rows
-    planned = first_guess(plan)
-    row_time_s = min(beat.row_time_s, planned.row_time_s or beat.row_time_s)
-    if row_time_s * plan.camera.height_px > SHORT * plan.shortest_flash_s or found.across > 0.0:
+    beat = found.fit.beat
+    at_once = rows_open_at_once(plan, beat)
+    if found.across > 0.0 or not (at_once or not _likely(plan, beat)):
         return None
-    few = rows.binned(ROWS)
+    few = replace(found.rows.binned(ROWS if at_once else ROLLING_ROWS), restless=None)
     known = unexplained(plan, few, beat)
     most = ALIKE * robust_loss(few, known, known) + LITTLE
     least_s = max(APART * plan.shortest_flash_s, ERRORS * found.fit.shift_error_s, SLACK * found.slack_s)
-    as_planned = replace(beat, row_time_s=planned.row_time_s, exposure_s=planned.exposure_s)
-    for start in (beat, as_planned) if plan.camera.readout_s is not None else (beat,):
-        for other in (*_nearby(plan, few, start), *_others(plan, few, start)):
-            apart = _apart_s(plan, rows, beat, other) > least_s
+    for start in _shutters(plan, beat):
+        for other in (*(_nearby(plan, few, start) if at_once else ()), *_others(plan, few, start)):
+            apart = _apart_s(plan, found.rows, beat, other) > least_s
             if apart and robust_loss(few, unexplained(plan, few, other), known) < most:
                 return other
     return None
+
+
+def rows_open_at_once(plan: Plan, beat: Beat) -> bool:
+    """Return whether all rows of a beat, or of the plan's camera, open at nearly the same time."""
+    row_time_s = min(beat.row_time_s, first_guess(plan).row_time_s or beat.row_time_s)
+    return row_time_s * plan.camera.height_px <= SHORT * plan.shortest_flash_s
+
+
+def _shutters(plan: Plan, beat: Beat) -> tuple[Beat, ...]:
+    planned = first_guess(plan)
+    as_planned = replace(beat, row_time_s=planned.row_time_s, exposure_s=planned.exposure_s)
+    return (beat, as_planned) if plan.camera.readout_s is not None else (beat,)
 
 
 def _nearby(plan: Plan, rows: Profiles, beat: Beat) -> Iterator[Beat]:

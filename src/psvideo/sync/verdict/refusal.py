@@ -103,14 +103,20 @@ def in_step_with_frames(plan: Plan) -> str:
     )
 
 
-def other_times_as_well(plan: Plan, found: ClipFit, other: Beat) -> str:
-    """Say that flashes at other times explain the picture as well, under another clock, and what to do."""
+def other_times_as_well(plan: Plan, found: ClipFit, other: Beat, *, at_once: bool) -> str:
+    """Say that flashes at other times explain the picture as well, under another clock, and what to do; ``at_once``:
+    all rows open at nearly the same time."""
     one, another = found.fit.beat.clock.mean_offset_ppm(), other.clock.mean_offset_ppm()
+    why = (
+        "All rows open at nearly the same time, so that whether the beginning or the end of an exposure cuts a flash "
+        "shows only in the strobe's clock"
+        if at_once
+        else "Hardly any row opens or closes during a flash, so that a subject that moves may feign the strobe's clock"
+    )
     return (
-        "flashes at other times explain the picture as well. All rows open at nearly the same time, so that whether "
-        "the beginning or the end of an exposure cuts a flash shows only in the strobe's clock, and it may be "
-        f"{one:+.0f} ppm off the camera's or {another:+.0f} ppm. Film longer, until every flash has come in and gone "
-        "out of the exposure, or plan another dark time, so that flashes fall all over the frame (dark_s = "
+        f"flashes at other times explain the picture as well. {why}, and it may be {one:+.0f} ppm off the camera's or "
+        f"{another:+.0f} ppm. Film longer, until every flash has come in and gone out of the exposure, or plan another "
+        "dark time, so that flashes fall all over the frame (dark_s = "
         f"{plan.dark_s + 0.1 * plan.camera.frame_period_s:.4g} under [strobe])."
     )
 
