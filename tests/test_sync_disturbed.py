@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from disturbed_shots import COLUMNS, ROWS, PlanMaker, plates, rms_rows, shoot, timing_of, unknown_readout
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter  # type: ignore[attr-defined]
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import parse_timing, timing_record

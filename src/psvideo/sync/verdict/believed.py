@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, Seed, gain_of
@@ -44,7 +46,9 @@ GAPPED = 0.8
 EXCUSES = 2
 """A fit with this many excuses (missing frames, a clock beyond the plan's tolerance) must explain more."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
-LENGTH_FRAMES = 200
+LENGTH_FRAMES, LENGTH_ROWS, ROWS_EACH = 200, 48, 4
+"""Frames and rows in which they are tried; of rows so many as a flash still spans this many, where there are: rows that
+are averaged over a whole flash make it look longer."""
 FLASHES_DIFFER = 0.7
 """Flashes of other lengths are likely where they leave less than this share of the robust loss."""
 
@@ -182,10 +186,12 @@ def _gaps_feigned(found: ClipFit) -> bool:
 
 def flashes_differ(plan: Plan, found: ClipFit) -> bool:
     """Return whether flashes much longer or shorter than the plan's, in the same places without tails, fit better."""
-    rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
+    beat = found.fit.beat
+    shortest_s = plan.shortest_flash_s
+    sharp = int(np.ceil(ROWS_EACH * beat.row_time_s * len(found.rows.place) / shortest_s))
+    rows = found.rows.take(slice(0, LENGTH_FRAMES)).binned(max(LENGTH_ROWS, sharp))
     rest = unexplained(plan, rows, beat)
     limit = FLASHES_DIFFER * robust_loss(rows, rest, rest)
-    shortest_s = plan.shortest_flash_s
     tails_s = beat.rise_s + beat.fall_s - plan.rise_s - plan.fall_s
     for factor in OTHER_LENGTHS:
         longer_s = (factor - 1) * shortest_s

@@ -9,7 +9,7 @@ Whatever the readout, a clock that is farther off than the plan says is believed
 tolerance explains the clip as well: a subject that moves past flashes that no row splits feigns any.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -63,7 +63,8 @@ def fits_elsewhere(plan: Plan, found: ClipFit) -> Beat | None:
     most = ALIKE * robust_loss(few, known, known) + LITTLE
     least_s = max(APART * plan.shortest_flash_s, ERRORS * found.fit.shift_error_s, SLACK * found.slack_s)
     for start in _shutters(plan, beat):
-        for other in (*(_nearby(plan, few, start) if at_once else ()), *_others(plan, few, start)):
+        nearby: Iterable[Beat] = _nearby(plan, few, start) if at_once else ()
+        for other in (*nearby, *_others(plan, few, start)):
             apart = _apart_s(plan, found.rows, beat, other) > least_s
             if apart and robust_loss(few, unexplained(plan, few, other), known) < most:
                 return other
