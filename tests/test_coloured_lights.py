@@ -10,6 +10,7 @@ from ring_and_ball import ball, ring
 import psvideo as ps
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
+from psvideo.plates.several_lights.surface_colour import contradicted
 
 Array = NDArray[np.float64]
 NOISE, GREY = 0.004, np.array([0.5, 0.5, 0.5])
@@ -118,3 +119,15 @@ def test_codes_half_floats_clipped_and_unseen_samples_follow_the_same_weights() 
         codes, one.directions, intensities=one.colours, solver="least-squares", black_level=4000, white_level=54000
     )
     assert np.median(off_deg(other.normals.astype(np.float64), one)) < 1.3 * best_deg(one, GREY)
+
+
+def test_dark_that_shows_noise_alone_contradicts_nothing_and_what_moved_does() -> None:
+    """Such pixels once took a first round's light from one flash each, and its noise for that of every pixel."""
+    random, shading, colour = np.random.default_rng(1), np.array([0.3, 0.2, 0.25]), np.array([0.9, 0.6, 0.5])
+    products = np.zeros((3, 40, 60, 3), np.float32)
+    products[:, :, :30] = shading[:, None, None, None] * colour
+    products[1, 10:20, 5:15] = 0.3 * colour[::-1]  # another surface, under one of the lamps
+    products += random.normal(0, 0.001, products.shape).astype(np.float32)
+    found = contradicted(products)
+    assert found[12:18, 7:13].all()
+    assert not found[:, 34:].any()

@@ -10,6 +10,7 @@ from functools import reduce
 import cv2
 import numpy as np
 
+from psvideo.compute.ranks import quantile
 from psvideo.model.arrays import Flags, Image
 
 CONTRADICTION = 0.05
@@ -17,6 +18,12 @@ CONTRADICTION = 0.05
 8 degrees apart leave this much, and noise of 5 % of the light."""
 MOVED = 0.1
 """This much leaves no doubt that something moved between them, and that flow did not bring it together."""
+QUIETEST, NOISY = 0.25, 9.0
+"""Noise contradicts itself, too: in the dark, this share of the picture, by a mean square of which this many times is
+motion."""
+LEAST_MOVED, BRIGHT = 0.01, 0.99
+"""What contradicts itself by the first share of the light that the second share of the picture stays below does not so
+for noise alone, also where all of the picture moves."""
 WINDOW_PX = 5
 """Contradictions are looked for in means over this many pixels: noise makes less of them."""
 NEIGHBOURHOODS = (1 / 24, 1 / 8, 1 / 3, 2.0)
@@ -37,9 +44,10 @@ LEAST = 0.02
 
 def contradicted(products: Image) -> Flags:
     """Return where the flashes show different surfaces, (row, col); ``products`` are (lamp, row, col, channel)."""
-    rest, whole = _unexplained(products)
     window = (WINDOW_PX, WINDOW_PX)
-    return np.asarray(cv2.blur(rest, window) > MOVED**2 * cv2.blur(whole, window))
+    rest, whole = (np.asarray(cv2.blur(squares, window), np.float32) for squares in _unexplained(products))
+    by_noise = min(NOISY * quantile(rest, QUIETEST), LEAST_MOVED**2 * quantile(whole, BRIGHT))
+    return np.asarray(rest > np.maximum(MOVED**2 * whole, np.float32(by_noise)))
 
 
 def colours_of(products: Image, where: Flags) -> tuple[Image, Flags]:
