@@ -316,8 +316,8 @@ def test_light_that_clips_is_not_taken_for_lamps_that_flicker_or_flash_together(
 @pytest.mark.parametrize(
     ("over", "room", "words"),
     [
-        (4.0, 0.0, "overexposed: pixels that clip make .* a smaller aperture"),
-        (6.0, 0.0, "overexposed: pixels that clip make .* a smaller aperture"),
+        (4.0, 0.0, "overexposed: clipped pixels account for .* a smaller aperture"),
+        (6.0, 0.0, "overexposed: clipped pixels account for .* a smaller aperture"),
         (4.0, 1.5, "overexposed, most of it in all frames"),
     ],
 )

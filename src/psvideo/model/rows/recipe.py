@@ -132,9 +132,9 @@ def _separated(weights: Doubles, beyond: Doubles, *, whole: float, dark: bool) -
     """
     foreign = weights.sum(axis=0) + beyond - weights
     some = weights * (foreign <= MOST_FOREIGN)
-    first = np.stack(
-        [_first(*one, whole=whole, dark=dark and not n) for n, one in enumerate(zip(some, foreign, strict=True))]
-    )
+    first = np.stack([_first(*one, whole=whole, dark=False) for one in zip(some, foreign, strict=True)])
+    if dark:
+        first[0] = _first(some[0], foreign[0], whole=whole, dark=True)
     own = first[0].copy()
     mixed = np.einsum("fr,kfr->kr", own, weights[1:])  # what the first sum holds of the other flashes
     rows = np.flatnonzero((np.abs(mixed) > NO_FOREIGN).any(axis=0) | ((own * beyond).sum(axis=0) > NO_FOREIGN))

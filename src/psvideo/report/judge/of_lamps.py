@@ -196,7 +196,7 @@ def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool, f
     enough = others >= LEAST_LIGHTS
     rest = f"; normals come from the other {others}." if enough else "."
     if flat:
-        rest = f"; the other {others} lie in one plane with the subject, across which nothing shows how normals stand."
+        rest = f"; the other {others} lie in one plane with the subject, and do not show how normals tilt across it."
     named = listed([repr(light) for light, _ in dead], NAMED)
     most = f"{100 * max(0.0, *(share for _, share in dead)):.1f} % of the strongest"
     one = len(dead) == 1

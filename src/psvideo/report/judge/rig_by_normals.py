@@ -158,8 +158,8 @@ def _partly_hollow(observed: Observed, *, guessed: bool) -> Judgement:
     return Judgement(
         subject="rig",
         grade="doubtful",
-        found="Where the subject ends some normals face outwards, and others inwards where the outline runs alike: a "
-        f"part of it is hollow, as a bowl is, or has holes. So outlines do not tell {unsure}."
+        found="Along the subject's outline some normals face outwards and others inwards, on stretches that run in the "
+        f"same direction: a part of it is hollow, as a bowl is, or has holes. So the outline does not tell {unsure}."
         f"{_as_it_is_seen(observed)}",
         advice="If nothing in the picture is hollow, check that the rig file is in camera axes (x right, y up), and "
         "names the lights as the plan does."

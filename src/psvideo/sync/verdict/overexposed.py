@@ -18,9 +18,9 @@ def overexposed(rows: Profiles) -> str:
     if share < MOSTLY:
         return ""
     return (
-        f"The picture is overexposed: pixels that clip make {100 * min(share, 1.0):.0f} % of what its rows change by, "
-        f"and show neither how bright a flash was nor which share of it a row saw. {TOO_BRIGHT}. If the strobe is not "
-        "found then, check that plan.toml is the plan that it played."
+        f"The picture is overexposed: clipped pixels account for {100 * min(share, 1.0):.0f} % of how its rows change, "
+        f"and show neither how bright a flash was nor how much of it a row saw. {TOO_BRIGHT}. If the strobe is still "
+        "not found, check that plan.toml is the plan that it played."
     )
 
 

@@ -111,7 +111,8 @@ def other_times_as_well(plan: Plan, found: ClipFit, other: Beat, *, at_once: boo
         "All rows open at nearly the same time, so that whether the beginning or the end of an exposure cuts a flash "
         "shows only in the strobe's clock"
         if at_once
-        else "Hardly any row opens or closes during a flash, so that a subject that moves may feign the strobe's clock"
+        else "It does not show well enough when each flash fired, as where hardly any row opens or closes during one "
+        "while the subject moves, so that the strobe's clock is not known"
     )
     return (
         f"flashes at other times explain the picture as well. {why}, and it may be {one:+.0f} ppm off the camera's or "
