@@ -181,6 +181,15 @@ def test_tails_of_most_of_a_flash_hide_no_row_of_a_camera_that_is_always_open() 
     assert all(flash_recipe(camera, timing, flash, range(FRAMES)).seen.all() for flash in timing.flashes[2:6])
 
 
+def test_frames_that_saw_next_to_nothing_of_a_flash_add_no_noise_to_its_plate() -> None:
+    """Two frames share a row's flash; a third, which saw a millionth of it, added as much noise as either."""
+    camera = camera_of()
+    timing = timing_of(camera, gap=1.3, fall_s=7e-4)
+    for flash in timing.flashes[2:6]:
+        recipe = flash_recipe(camera, timing, flash, range(FRAMES))
+        assert (recipe.coefficients**2).sum(axis=0).max() < 2.1
+
+
 def test_a_neighbour_whose_frames_are_missing_hides_the_rows_that_it_reaches_into() -> None:
     camera, timing = camera_of(), timing_of(camera_of(), gap=0.97, dark=9)
     flash = timing.flashes[3]
