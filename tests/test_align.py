@@ -20,6 +20,7 @@ from filmed_rounds import (
     noiseless,
     seen,
 )
+from motion_of_pixels import pixels_per_s
 
 from psvideo.model.surface import Surface
 from psvideo.plates.align import between
@@ -30,7 +31,6 @@ from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity import all_lights
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST, BOTH
-from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of

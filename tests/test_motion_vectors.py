@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from motion_of_pixels import pixels_per_s
 
 from psvideo.compute import spilled
 from psvideo.compute.spilled import lie_in_files
@@ -15,7 +16,6 @@ from psvideo.export.space import Space
 from psvideo.model.surface import Surface
 from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.followed import Followed
-from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.runs.delivery.delivering import motion_of
 
 ROWS, COLS = 120, 160

@@ -21,7 +21,7 @@ from psvideo.model.timing import Timing
 from psvideo.runs.sync import sync
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit import kernel
-from psvideo.sync.rowfit.beat import Beat, FoundClock, train_until
+from psvideo.sync.rowfit.beat import Beat, FoundClock, train_between
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
@@ -292,7 +292,7 @@ def test_the_fit_uses_exactly_the_row_weights(readout: float, shutter: float, ma
         window_start=np.array([0, 12]),
     )
     rest = unexplained(plan, rows, Beat(clock=clock, row_time_s=abs(camera.row_time_s), exposure_s=camera.exposure_s))
-    train = train_until(plan, clock, 26 * camera.frame_period_s)
+    train = train_between(plan, clock, 0.0, 26 * camera.frame_period_s)
     unknown = np.array([1, 2, 3, 0])[train.slot]
     weights = row_weights(camera, train.start_s, train.duration_s, frames=range(24))
     for row in range(camera.height_px):

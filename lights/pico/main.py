@@ -494,11 +494,19 @@ class Pace:
         return step
 
     def trim(self, ppm, since):
-        """Have the steps from ``since`` on last by so many ppm longer, or shorter below 0; they lose their words."""
+        """Have the steps from ``since`` on last by so many ppm of a mean step longer, or shorter below 0.
+
+        Their words are to be written again. ``share`` is what each of them is longer by: whole ticks, and parts of one.
+        """
         if self.written is not None:
-            self.carried = (self.carried - (self.written - since) * self.share[1]) % self.parts
+            self._forget_words(since)
         self.share = divmod(self.cycle * ppm, self.parts)
         self.since = self.written = since
+
+    def _forget_words(self, since):
+        """Take back what the words from ``since`` on carried: the parts of a tick that were over before that step."""
+        _, rest = self.share
+        self.carried = (self.carried - (self.written - since) * rest) % self.parts
 
     def write(self):
         """Give the next steps their words. Returns the first of them."""

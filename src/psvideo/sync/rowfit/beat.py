@@ -93,11 +93,6 @@ class Beat:
         return replace(self, clock=replace(self.clock, phase_s=phase_s))
 
 
-def train_until(plan: Plan, clock: FoundClock, until_s: float) -> FlashTrain:
-    """Return the flashes that can touch frames from 0 s to ``until_s``, as times on the camera's clock."""
-    return train_between(plan, clock, 0.0, until_s)
-
-
 def train_between(plan: Plan, clock: FoundClock, from_s: float, until_s: float) -> FlashTrain:
     """Return the flashes between two times, and at least a cycle more at either end, on the camera's clock."""
     cycle = len(plan.cycle_slots)

@@ -1,5 +1,6 @@
 """Whether a fit is to be believed, and the fit of the plan that was meant where the one given is wrong by far."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,18 +90,29 @@ def _unless_elsewhere(verdict: Verdict) -> Verdict:
 
 
 def _as_meant(plan: Plan, rows: Profiles, found: ClipFit) -> tuple[Plan, ClipFit]:
-    """Return the likeliest plan with another camera and its fit; the given ones unless they leave clearly more."""
-    leaves = CLEARLY if convincing(plan, found) else BETTER
-    for rivals in (camera_rivals(plan), double_rivals(plan)):
-        meant = best_rival(plan, rows, list(rivals), least=FAIR, leaves=leaves)
-        if meant is not None:
-            again = find(meant.plan, rows, measured=("exposure_s",) if meant.fault == "shutter" else ())
-            gains = [gain_of(one.rows, one.fit.rest) for one in (found, again)]
-            if convincing(meant.plan, again) and 1 - gains[1] < leaves * (1 - gains[0]):
-                return meant.plan, again
-        if convincing(plan, found):
-            break
-    return plan, found
+    """Return the likeliest plan with another camera and its fit; the given ones unless they leave clearly more.
+
+    Another exposure and another readout at once are tried only where neither the plan nor one of them convinces.
+    """
+    sure = convincing(plan, found)
+    leaves = CLEARLY if sure else BETTER
+    likelier = _likelier(plan, rows, found, camera_rivals(plan), leaves=leaves)
+    if likelier is None and not sure:
+        likelier = _likelier(plan, rows, found, double_rivals(plan), leaves=leaves)
+    return likelier or (plan, found)
+
+
+def _likelier(
+    plan: Plan, rows: Profiles, found: ClipFit, rivals: Iterable[Rival], *, leaves: float
+) -> tuple[Plan, ClipFit] | None:
+    """Return the best of a plan's rivals and its fit of the whole clip; None unless that convinces and leaves less than
+    the share ``leaves`` of the robust loss that the plan's fit leaves."""
+    rival = best_rival(plan, rows, list(rivals), least=FAIR, leaves=leaves)
+    if rival is None:
+        return None
+    again = find(rival.plan, rows, measured=("exposure_s",) if rival.fault == "shutter" else ())
+    left, left_again = (1 - gain_of(one.rows, one.fit.rest) for one in (found, again))
+    return (rival.plan, again) if convincing(rival.plan, again) and left_again < leaves * left else None
 
 
 def convincing(plan: Plan, found: ClipFit) -> bool:

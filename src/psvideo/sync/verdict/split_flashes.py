@@ -6,14 +6,17 @@ of which a^(1/g) + b^(1/g) is 1; no exposure that a frame holds makes a + b more
 much for all parts.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from psvideo.compute.ranks import median, quantile
-from psvideo.model.arrays import Doubles, Integers
+from psvideo.model.arrays import Doubles, Flags, Integers
 from psvideo.model.half_flash import HalfFlash
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import compiled_flashes
+from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes
+from psvideo.sync.rowfit.row_model import Flashes
 
 WHOLE_SHUTTER, NEARLY = 0.98, 0.999
 """Shares of the frame that is exposed, and of the exposure that flashes must be apart, for parts to add up."""
@@ -64,31 +67,76 @@ def power_of_parts(parts: Doubles) -> float | None:
     return power if bent and (one_power or quantile(sums, 0.1) > MORE_THAN_ALL) else None
 
 
+@dataclass(frozen=True, kw_only=True)
+class _SplitFlashes:
+    """What two frames in a row saw of flashes, (flash, row), NaN where a frame is missing.
+
+    light: (flash,) which unknown each flash is, 0 for a dark slot. first: what the frame shows that is open when the
+    flash starts; second: what the next one shows. split: the row closed while the flash was on, so that both saw a part
+    of it. whole: the first one saw all of it.
+    """
+
+    light: Integers
+    first: Doubles
+    second: Doubles
+    split: Flags
+    whole: Flags
+
+
 def _parts(plan: Plan, found: ClipFit) -> Doubles:
-    """Return what two frames in a row saw of flashes that they split, (part, 2), as shares of all of it."""
-    rows, beat = found.rows, found.fit.beat
-    flashes = compiled_flashes(plan, rows, beat)
-    some = np.unique(np.linspace(0, len(flashes.start_s) - 1, MOST_FLASHES).astype(np.int64))
-    start_s, lasts_s, light = flashes.start_s[some, None], flashes.duration_s[some, None], flashes.unknown[some]
-    opens_s = rows.place * beat.row_time_s
-    first = np.floor((start_s - lasts_s / 2 - opens_s) / rows.period_s).astype(np.int64)  # that is open just before it
-    ends_s = (first + 1) * rows.period_s + opens_s - start_s  # after the flash's start, (flash, row)
-    split = ends_s < 1.5 * lasts_s
-    whole = (ends_s > 2 * lasts_s) & (ends_s - rows.period_s < -lasts_s)
-    seen, after = _at(found, first), _at(found, first + 1)
-    kinds = range(flashes.unknowns)
-    if len(np.unique(light)) < len(kinds):
-        return np.zeros((0, 2))  # without a dark slot room light is not known
-    every = [_middle(np.where(whole[light == one], seen[light == one], np.nan)) for one in kinds]
-    dark, all_of_it = every[0], np.stack([one - every[0] for one in every])
-    strays = np.abs(seen - dark - all_of_it[light])
-    spread = np.stack([_middle(np.where(whole[light == one], strays[light == one], np.nan)) for one in kinds])
-    bright = np.nan_to_num(all_of_it)
-    hidden = 0.0 if rows.doubt is None else rows.doubt.max(axis=0)
-    steady = (bright > LEAST_LIGHT * bright.max()) & (spread < STEADY * bright) & (hidden <= UNCLIPPED * bright)
-    counts = split & steady[light] & (light[:, None] > 0) & np.isfinite(seen + after)
-    parts = np.stack([(one - dark)[counts] / all_of_it[light][counts] for one in (seen, after)], axis=1)
+    """Return what two frames in a row saw of flashes that they split, (part, 2), as shares of all of it; no part
+    without a dark slot, since room light is not known then."""
+    flashes = compiled_flashes(plan, found.rows, found.fit.beat)
+    seen = _seen(flashes, found)
+    if len(np.unique(seen.light)) < flashes.unknowns:
+        return np.zeros((0, 2))
+    dark, flash_alone, spread = _levels(seen, flashes.unknowns)
+    steady = _steady(flash_alone, spread, found.rows)
+    light = seen.light
+    counts = seen.split & steady[light] & (light[:, None] > 0) & np.isfinite(seen.first + seen.second)
+    parts = np.stack([(one - dark)[counts] / flash_alone[light][counts] for one in (seen.first, seen.second)], axis=1)
     return np.asarray(parts[(parts.min(axis=1) > PART[0]) & (parts.max(axis=1) < PART[1])])
+
+
+def _seen(flashes: Flashes, found: ClipFit) -> _SplitFlashes:
+    """Return what frames saw of up to ``MOST_FLASHES`` flashes, evenly over the clip."""
+    rows = found.rows
+    some = np.unique(np.linspace(0, len(flashes.start_s) - 1, MOST_FLASHES).astype(np.int64))
+    start_s, lasts_s = flashes.start_s[some, None], flashes.duration_s[some, None]
+    opens_s = rows.place * found.fit.beat.row_time_s
+    frame = np.floor((start_s - lasts_s / 2 - opens_s) / rows.period_s).astype(np.int64)  # open just before the flash
+    ends_s = (frame + 1) * rows.period_s + opens_s - start_s  # when it closes, after the flash's start
+    return _SplitFlashes(
+        light=flashes.unknown[some],
+        first=_at(found, frame),
+        second=_at(found, frame + 1),
+        split=ends_s < 1.5 * lasts_s,
+        whole=(ends_s > 2 * lasts_s) & (ends_s - rows.period_s < -lasts_s),
+    )
+
+
+def _levels(seen: _SplitFlashes, unknowns: int) -> tuple[Doubles, Doubles, Doubles]:
+    """Return what rows show in the dark (row,), how much more by a whole flash of each unknown, and by how much that
+    changes from flash to flash, (unknown, row) both: medians over the flashes that one frame saw whole."""
+
+    def by_unknown(values: Doubles) -> list[Doubles]:
+        alike = [seen.light == one for one in range(unknowns)]
+        return [_middle(np.where(seen.whole[some], values[some], np.nan)) for some in alike]
+
+    every = by_unknown(seen.first)
+    dark, flash_alone = every[0], np.stack([one - every[0] for one in every])
+    strays = np.abs(seen.first - dark - flash_alone[seen.light])
+    return dark, flash_alone, np.stack(by_unknown(strays))
+
+
+def _steady(flash_alone: Doubles, spread: Doubles, rows: Profiles) -> Flags:
+    """Return which rows of which unknown are bright enough, hardly change and hide hardly any light in saturated
+    pixels, (unknown, row)."""
+    bright = np.nan_to_num(flash_alone)
+    hidden = 0.0 if rows.doubt is None else rows.doubt.max(axis=0)
+    return np.asarray(
+        (bright > LEAST_LIGHT * bright.max()) & (spread < STEADY * bright) & (hidden <= UNCLIPPED * bright)
+    )
 
 
 def _at(found: ClipFit, place: Integers) -> Doubles:

@@ -22,13 +22,6 @@ SMOOTH_PX = 27
 """Vectors of plain parts are means over such a window, as where alignment lets them grow."""
 
 
-def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Floats:
-    """Return the velocity of every pixel of a picture (row, col[, channel]), x right and y down, (row, col, 2)."""
-    planes = np.empty((2, *shape[:2]), np.float32)
-    fill_per_s(motion, planes)
-    return np.moveaxis(planes, 0, -1)
-
-
 def fill_per_s(motion: Followed | None, planes: Floats) -> None:
     """Fill ``planes`` (2, row, col) with the velocity of every pixel of a picture of that shape, x right and y down."""
     rows, cols = planes.shape[1:]

@@ -55,24 +55,20 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     Noise hides part of the signs. With it an error is never predicted smaller than without: what signs are likely to be
     counts where that is more than noise and what they surely are.
     """
-    from psvideo.solve.normals.trust.doubting_kernel import fill_doubt
+    from psvideo.solve.normals.trust import doubting_kernel as kernel
 
-    counts = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
-    factors = (counts, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
-    by_three = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
-    planes = np.stack(
-        [
-            *(signs.misfit_deg, signs.torn_deg, signs.likely_misfit_deg, signs.likely_torn_deg),
-            *(signs.indirect_deg, signs.lost_deg, signs.noise_deg),
-            *(
-                np.broadcast_to(np.float32(one), signs.misfit_deg.shape)
-                for one in (
-                    *(signs.uneven, signs.unchecked_deg),
-                    *(np.float32(how.by_model) * signs.by_model_deg, signs.torn_share, by_three),
-                )
-            ),
-        ]
-    )
+    times = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
+    counts = (times, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
+    planes = np.empty((kernel.SIGNS, *signs.misfit_deg.shape), np.float32)
+    planes[kernel.MISFIT], planes[kernel.LIKELY_MISFIT] = signs.misfit_deg, signs.likely_misfit_deg
+    planes[kernel.TORN], planes[kernel.LIKELY_TORN] = signs.torn_deg, signs.likely_torn_deg
+    planes[kernel.TORN_SHARE] = signs.torn_share
+    planes[kernel.AROUND], planes[kernel.UNCHECKED] = signs.indirect_deg, signs.unchecked_deg
+    planes[kernel.LOST], planes[kernel.NOISE] = signs.lost_deg, signs.noise_deg
+    planes[kernel.UNEVEN] = signs.uneven
+    planes[kernel.AT_LEAST] = np.float32(how.by_model) * signs.by_model_deg
+    planes[kernel.BESIDE_MISFIT] = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
     doubt = np.empty(planes.shape[1:], np.float32)
-    fill_doubt(planes.reshape(len(planes), -1), np.array(factors, np.float32), doubt.reshape(-1))
+    factors = kernel.Factors(*np.array(counts, np.float32))
+    kernel.fill_doubt(planes.reshape(len(planes), -1), factors, doubt.reshape(-1))
     return doubt

@@ -5,6 +5,7 @@ Numpy took a pass of a small picture for every operation, sixty of them. All are
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,14 @@ TINY = np.float32(1e-9)
 LEAST_SHOWN = np.float32(1e-9)
 """Powers of less are slow: numbers as small are stored in another way."""
 TO_DEG = np.float32(180 / math.pi)
+MISFIT, TORN, LIKELY_MISFIT, LIKELY_TORN, AROUND, LOST, NOISE = range(7)
+"""The planes of signs that ``fill_doubt`` reads, in degrees: a misfit and what is torn, surely and likely; light from
+around; what noise makes more where few lights reach; and what noise makes."""
+UNEVEN, UNCHECKED, AT_LEAST, TORN_SHARE, BESIDE_MISFIT = range(7, 12)
+"""Which share of the misfit is uneven; what cannot be checked; what the whole error is at least; by which share of
+themselves torn normals count whatever else shows; what albedo and shadows show where lights hardly check each other,
+other signs of a misfit, which count where they are more."""
+SIGNS = 12
 
 
 @FUSED.kept
@@ -198,45 +207,58 @@ def fill_indirect_deg(
         out[i] = TO_DEG * (around + own) * np.sqrt(max(size - along * along, ZERO))
 
 
-@FUSED.kept
-def fill_doubt(signs: Floats, factors: Floats, out: Floats) -> None:
-    """Fill ``out`` with degrees of doubt: by what is sure and what noise makes more, or by what is likely without
-    noise, whichever is more.
+class Factors(NamedTuple):
+    """How much the signs of ``fill_doubt`` count, float32: a misfit m as ``misfit`` times m^(1 + ``power``) over
+    m + ``little_deg``; light from ``around``; and ``torn`` normals, up to the share ``torn_beside`` of the other doubt
+    and ``torn_alone_deg``."""
 
-    signs: (sign, point) in degrees, a misfit and what is torn, both surely and likely; light from around; what noise
-    makes more where few lights reach; what noise makes; which share of the misfit is uneven; what cannot be checked;
-    what the whole error is at least; by how much of themselves torn normals count whatever else shows; what albedo
-    and shadows show where lights hardly check each other, other signs of a misfit, which count where they are more.
-    factors: how much a misfit counts, for few lights as well; its power beyond 1; what is little of it; how much light
-    from around counts, what is torn, and that at most, beside the rest and alone.
-    """
-    times, power, little, around = factors[0], factors[1], factors[2], factors[3]
-    torn, beside, alone = factors[4], factors[5], factors[6]
-    by_roots = power == HALF  # far quicker than a power
+    misfit: np.float32
+    power: np.float32
+    little_deg: np.float32
+    around: np.float32
+    torn: np.float32
+    torn_beside: np.float32
+    torn_alone_deg: np.float32
+
+
+@FUSED.kept
+def fill_doubt(signs: Floats, factors: Factors, out: Floats) -> None:
+    """Fill ``out`` (point,) with degrees of doubt, from ``signs`` (``SIGNS``, point), in degrees but for shares: by
+    what is sure and what noise makes more, or by what is likely without noise, whichever is more."""
+    by_roots = factors.power == HALF
     for i in range(len(out)):
-        by_others, unchecked = around * signs[4, i], signs[8, i]
-        turned, most = np.sqrt(by_others * by_others + unchecked * unchecked), alone + unchecked
-        shows, likely_shows = max(signs[0, i], LEAST_SHOWN), max(signs[2, i], LEAST_SHOWN)
-        if by_roots:
-            shows, likely_shows = shows * np.sqrt(shows), likely_shows * np.sqrt(likely_shows)
-        else:
-            shows, likely_shows = shows ** (ONE + power), likely_shows ** (ONE + power)
-        sure = _turned(signs[0, i], times * shows, little, signs[7, i], turned)
-        likely = _turned(signs[2, i], times * likely_shows, little, signs[7, i], turned)
-        by_slope = signs[11, i] * signs[11, i] + turned * turned
-        more, likely_more = max(by_slope - sure * sure, ZERO), max(by_slope - likely * likely, ZERO)
-        sure += torn * max(min(signs[1, i], beside * sure + most), signs[10, i] * signs[1, i])
-        likely += torn * max(min(signs[3, i], beside * likely + most), signs[10, i] * signs[3, i])
-        lost, noise = signs[5, i], signs[6, i]
-        least = max(likely * likely + likely_more, signs[9, i] * signs[9, i])
+        around, unchecked = factors.around * signs[AROUND, i], signs[UNCHECKED, i]
+        hidden = np.sqrt(around * around + unchecked * unchecked)
+        torn_alone, torn_share = factors.torn_alone_deg + unchecked, signs[TORN_SHARE, i]
+        sure = _turned(signs[MISFIT, i], factors, by_roots, signs[UNEVEN, i], hidden)
+        likely = _turned(signs[LIKELY_MISFIT, i], factors, by_roots, signs[UNEVEN, i], hidden)
+        shown = signs[BESIDE_MISFIT, i] * signs[BESIDE_MISFIT, i] + hidden * hidden
+        more, likely_more = max(shown - sure * sure, ZERO), max(shown - likely * likely, ZERO)
+        sure = _with_torn(sure, signs[TORN, i], factors, torn_alone, torn_share)
+        likely = _with_torn(likely, signs[LIKELY_TORN, i], factors, torn_alone, torn_share)
+        lost, noise = signs[LOST, i], signs[NOISE, i]
+        least = max(likely * likely + likely_more, signs[AT_LEAST, i] * signs[AT_LEAST, i])
         out[i] = np.sqrt(max(sure * sure + more + lost * lost, least - noise * noise))
 
 
 @FUSED.inlined
 def _turned(
-    misfit_deg: np.float32, shows: np.float32, little: np.float32, uneven: np.float32, turned: np.float32
+    misfit_deg: np.float32, factors: Factors, by_roots: bool, uneven: np.float32, hidden_deg: np.float32
 ) -> np.float32:
-    """Return what a misfit makes of normals, of its power, beside what light from around does, and nothing shows."""
-    misfit = shows / (misfit_deg + little) if misfit_deg > ZERO else ZERO
+    """Return by how many degrees a misfit turns normals, of whose ``uneven`` share nothing is hidden, beside what shows
+    in no misfit, ``hidden_deg``. ``by_roots``: its power is a half, and a root is far quicker."""
+    shows = max(misfit_deg, LEAST_SHOWN)
+    shows = shows * np.sqrt(shows) if by_roots else shows ** (ONE + factors.power)
+    misfit = factors.misfit * shows / (misfit_deg + factors.little_deg) if misfit_deg > ZERO else ZERO
     misfit -= uneven * max(misfit - misfit_deg, ZERO)
-    return np.float32(np.sqrt(misfit * misfit + turned * turned))
+    return np.float32(np.sqrt(misfit * misfit + hidden_deg * hidden_deg))
+
+
+@FUSED.inlined
+def _with_torn(
+    doubt_deg: np.float32, torn_deg: np.float32, factors: Factors, alone_deg: np.float32, share: np.float32
+) -> np.float32:
+    """Return a doubt with what normals show that belong to no surface by ``torn_deg``: limited by the doubt itself and
+    ``alone_deg``, but not below a ``share`` of it."""
+    limited = min(torn_deg, factors.torn_beside * doubt_deg + alone_deg)
+    return np.float32(doubt_deg + factors.torn * max(limited, share * torn_deg))

@@ -173,15 +173,24 @@ def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
 
 
 def hidden_of(lit: Illumination, *, plain: bool, beside_slope: bool = True) -> float:
-    """Return how many times more than enough lights these hide of what is not matte, by their number (of least squares
-    1), or, of few lights, by how they stand where that is more."""
+    """Return how many times more than ``ENOUGH_LIGHTS`` these lights hide of what is not matte, since a normal and an
+    albedo follow it: by their number or, of four to six, by how they stand, whichever is more.
+
+    plain: residuals are of least squares, whose mean squares are for each measurement left free: their number does not
+    matter. beside_slope: what albedo shows is counted by itself (``by_slope.py``).
+    """
     lights = len(lit.directions)
     by_number = 1.0 if plain else hidden_by(lights) / hidden_by(ENOUGH_LIGHTS)
-    if not ALL_EXPLAINED < lights <= FEW_LIGHTS:
-        return by_number
+    few = ALL_EXPLAINED < lights <= FEW_LIGHTS
+    return max(by_number, _hidden_by_places(lit, plain=plain, beside_slope=beside_slope)) if few else by_number
+
+
+def _hidden_by_places(lit: Illumination, *, plain: bool, beside_slope: bool) -> float:
+    """Return the same of few lights by how they stand: how much farther than others they turn normals unseen, as a
+    power, up to ``MOST_HIDDEN``. Least squares is what solves four, and their measure of its own."""
     of_four = FOUR_BESIDE_SLOPE if beside_slope else TELLING_OF_FOUR
     times = turned_unseen(lit) / (of_four if plain else TELLING)
-    return max(by_number, min(float(times**HIDDEN_POWER), MOST_HIDDEN))
+    return min(float(times**HIDDEN_POWER), MOST_HIDDEN)
 
 
 def hidden_by(lights: int) -> float:
