@@ -101,6 +101,43 @@ def test_what_is_trusted_stays_as_it_was_measured() -> None:
         np.testing.assert_array_equal(one.albedo[both], other.albedo[both])
 
 
+def near_the_limit() -> list[Surface]:
+    """Rounds of a surface whose predicted errors lie about 5 degrees, up to which they are trusted."""
+    rng, errors_deg = np.random.default_rng(5), np.broadcast_to(np.linspace(2, 8, SHAPE[1]), SHAPE)
+    rounds = []
+    for one in some(3 * POOLED_ROUNDS):
+        error = (errors_deg * np.exp(rng.normal(0, 0.2, SHAPE))).astype(np.float32)
+        planes = rng.normal(0, 0.05, (3, *SHAPE)) + np.array([0.3, -0.2, 0.8])[:, None, None]
+        normals = np.moveaxis((planes / np.linalg.norm(planes, axis=0)).astype(np.float32), 0, -1)
+        everywhere = np.full(SHAPE, MEASURED, np.uint8)
+        rounds.append(replace(one, normals=normals, error_deg=error, valid=error <= 5, source=everywhere))
+    return rounds
+
+
+def test_what_most_rounds_trust_claims_no_more_than_what_is_trusted_and_shows_their_mean() -> None:
+    """A pixel stays valid in a round that by itself predicts more; which pixels are valid does not go by that."""
+    plain, votes, shown = near_the_limit(), near_the_limit(), near_the_limit()
+    before: Steady | None = None
+    held: Steady | None = None
+    true = np.array([0.3, -0.2, 0.8]) / np.linalg.norm([0.3, -0.2, 0.8])
+    off: list[list[float]] = []
+    flips: list[NDArray[np.bool_]] = []
+    for number, (own, vote, one) in enumerate(zip(plain, votes, shown, strict=True)):
+        before = steadied(before, vote, number, RESTS)
+        held = steadied(held, one, number, RESTS, most_deg=5.0)
+        np.testing.assert_array_equal(one.valid, vote.valid)
+        assert one.error_deg is not None
+        assert one.error_deg[one.valid].max() <= 5
+        kept = one.valid & ~own.valid
+        flips.append(one.valid != shown[number - 1].valid)
+        if number >= POOLED_ROUNDS:
+            assert kept.any()
+            off.append([float(np.linalg.norm(each.normals[kept] - true, axis=-1).mean()) for each in (own, one)])
+    by_itself, of_mean = np.mean(off, axis=0)
+    assert of_mean < 0.6 * by_itself
+    assert np.mean(flips[1:]) < np.mean([a.valid != b.valid for a, b in itertools.pairwise(plain)]) / 6
+
+
 def test_a_result_depends_on_its_block_of_rounds_and_the_one_before() -> None:
     late = 3 * POOLED_ROUNDS
     whole = list(run(some(late + 5), 0))

@@ -29,7 +29,7 @@ from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.plate_noise import spread_of
 from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
-from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.solving import Solving, most_claimed_deg
 from psvideo.solve.normals.task import Samples
 from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of
 from psvideo.solve.steady import SHOWN, Steady, steadied
@@ -158,7 +158,10 @@ class _RoundSolver:
         surface, lit = self._surface(one, given)
         if one.doubtful is not None:
             surface = _without(surface, one.doubtful)
-        steady = steadied(self.steady, surface, one.number, one.stood, _shown(given.seen), spare=self.solving.spare)
+        steady = steadied(
+            self.steady, surface, one.number, one.stood, _shown(given.seen),
+            most_deg=most_claimed_deg(len(one.plates)), spare=self.solving.spare,
+        )  # fmt: skip
         self.steady = None if self.one_by_one else steady
         plates, shown, mask = given.plates, given.shown, given.mask
         made = passes_of(self.asked, plates, surface, lit, seen=shown, mask=mask) if self.asked.any else None

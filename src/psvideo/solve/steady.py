@@ -1,12 +1,14 @@
 """Results held steady over rounds in which nothing moved: noise must not make classes and filled values flicker.
 
 Rounds are pooled in blocks of fixed numbers. A pixel's class is what most of the last rounds say, and what is not
-trusted shows their mean; what is trusted stays as it was measured. As a block goes on, its rounds take the place of the
-block before, one after the other, so that nothing jumps. Where the picture changed, a pixel begins again: nothing is
-smeared. It does so in the next round once more, for plates are made of two flashes each, and that round's still of what
-was there before. So a result depends on its block and the one before, and on no other round.
+trusted by most of them, or not by this one, shows their mean; what is trusted by both stays as it was measured. As a
+block goes on, its rounds take the place of the block before, one after the other, so that nothing jumps. Where the
+picture changed, a pixel begins again: nothing is smeared. It does so in the next round once more, for plates are made
+of two flashes each, and that round's still of what was there before. So a result depends on its block and the one
+before, and on no other round.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,6 +76,7 @@ def steadied(
     stood: Flags | None,
     shown: Flags = SHOWN,
     *,
+    most_deg: float = math.inf,
     spare: Path | None = None,
 ) -> Steady:
     """Hold a round's surface steady, in its own memory, and return what is held for the next one.
@@ -84,6 +87,8 @@ def steadied(
         where that is not known, and all begins again.
     shown: on a grid, False where frames were missing that some light showed the picture in: what is not there has no
         vote, and where it was not the round before, a pixel begins again.
+    most_deg: the error up to which a pixel is trusted, where errors hold nothing but what trust goes by: what most
+        rounds trust claims no more.
     spare: a folder in whose files much of what is held lies; left out, in memory.
     """
     if held is None or stood is None or number != held.number + 1:
@@ -94,7 +99,7 @@ def steadied(
     place = number % POOLED_ROUNDS + 1
     if place == 1:
         _turn(held)
-    still = Still(np.maximum(held.since, 1) - ONCE_MORE, place, POOLED_ROUNDS, held.trusted)
+    still = Still(np.maximum(held.since, 1) - ONCE_MORE, place, POOLED_ROUNDS, held.trusted, np.float32(most_deg))
     planes, albedo = stored(surface)
     error = np.zeros((0, 0), planes.dtype) if surface.error_deg is None else bits(surface.error_deg)
     if surface.source is None:

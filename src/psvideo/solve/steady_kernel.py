@@ -4,7 +4,9 @@ A round always decides by as many rounds as a block has: by those of its own blo
 that the block before had. Blocks of 16, a pixel that was trusted in 12 rounds of the block before: in the 4th round of
 this one, and trusted in 1 of them, it has (1 + 12 * 12 / 16) / 16 = 0.63 of the votes, and is trusted; in the 10th
 round, trusted in 3, (3 + 6 * 12 / 16) / 16 = 0.47, and is not. So a class that changes, changes once a block at most.
-Values are averaged alike, over the rounds in which the pixel was not trusted.
+Values are averaged alike, over the rounds in which the pixel was not trusted. What is trusted by most rounds, and not
+by this one alone, shows their mean too, and claims no more than the error up to which a pixel is trusted: half of its
+rounds or more predict less.
 """
 
 from typing import Any, NamedTuple
@@ -59,12 +61,14 @@ class Pool(NamedTuple):
 
 class Still(NamedTuple):
     """Since how many rounds nothing changed, on a coarse grid over the picture; which round of its block this is, from
-    1 on; how many make a block; and which pixels were trusted in the round before."""
+    1 on; how many make a block; which pixels were trusted in the round before; and the error, in degrees, that what is
+    trusted claims at most."""
 
     since: Bytes
     place: int
     block: int
     trusted: Bytes
+    most_deg: np.float32
 
 
 @FUSED.kept
@@ -122,6 +126,7 @@ def steady_rows(
     )
     p = Pool(lent(pool.votes), lent(pool.values), lent(pool.before), lent(pool.touched))
     where, new, since, trusted = lent(slots), lent(fresh), lent(still.since), lent(still.trusted)
+    block, place, most_deg = still.block, still.place, still.most_deg
     rows, cols = r.valid.shape
     work, made = np.zeros((WORK, SEGMENT), np.float32), np.zeros((p.values.shape[1], SEGMENT), np.float32)
     for row in range(first, last):
@@ -134,19 +139,19 @@ def steady_rows(
                 for i in range(width):
                     col = begin + i
                     stood = int(since[at_row, col * since.shape[1] // cols])
-                    rounds, source, valid = min(still.place, stood + 1), r.source[row, col], r.valid[row, col]
+                    rounds, source, valid = min(place, stood + 1), r.source[row, col], r.valid[row, col]
                     votes = p.votes[slot]
                     if stood == 0:
-                        _forget(votes, i, source, valid, still.block)
+                        _forget(votes, i, source, valid, block)
                     elif new[slot]:
-                        _begin(votes, i, rounds, trusted[row, col], still.block)
+                        _begin(votes, i, rounds, trusted[row, col], block)
                     trusted[row, col] = valid
                     _add(votes, i, rounds, source, valid, stood == 0, work)
-                    _decide(votes, i, source, still.block, work)
+                    _decide(votes, i, source, valid, block, work)
                     busy |= work[ADDS, i] + work[TAKES, i] + work[ZEROES, i] + work[FORGETS, i] > ZERO
                 if busy:
                     _add_values(r, p, row, begin, width, slot, work, made)
-                    _take_means(r, row, begin, width, work, made)
+                    _take_means(r, row, begin, width, most_deg, work, made)
                 for i in range(width):
                     r.source[row, begin + i] = np.uint8(work[SOURCE, i])
                     r.valid[row, begin + i] = np.uint8(work[VALID, i])
@@ -184,7 +189,7 @@ def _add(votes: Bytes, i: int, rounds: int, source: int, valid: int, changed: bo
 
 
 @FUSED.inlined
-def _decide(votes: Bytes, i: int, own: int, block: int, work: Floats) -> None:
+def _decide(votes: Bytes, i: int, own: int, valid: int, block: int, work: Floats) -> None:
     """Give a pixel the class that most rounds give it, and say whether it takes their mean."""
     rounds, count = int(votes[ROUNDS, i]), int(votes[VALUES, i])
     left = block - rounds  # rounds of the block before that count
@@ -201,7 +206,7 @@ def _decide(votes: Bytes, i: int, own: int, block: int, work: Floats) -> None:
     trusted = (source == MEASURED) & (sure >= HALF)
     work[SOURCE, i], work[VALID, i] = source, trusted
     work[ZEROES, i] = source == 0
-    work[TAKES, i] = known and source != 0 and not (trusted and own == MEASURED)
+    work[TAKES, i] = known and source != 0 and not (trusted and own == MEASURED and valid)
     work[WEIGHT, i], work[PER, i] = before, ONE / np.float32(max(count + before, 1))
 
 
@@ -222,17 +227,23 @@ def _add_values(
 
 
 @FUSED.called
-def _take_means(r: SurfacePlanes, row: int, begin: int, width: int, work: Floats, means: Floats) -> None:
-    """Give the pixels of a segment that take them their means, normals of length 1."""
+def _take_means(
+    r: SurfacePlanes, row: int, begin: int, width: int, most_deg: np.float32, work: Floats, means: Floats
+) -> None:
+    """Give the pixels of a segment that take them their means, normals of length 1, and of trusted ones an error of at
+    most ``most_deg``."""
     for i in range(width):
         square = means[0, i] * means[0, i] + means[1, i] * means[1, i] + means[2, i] * means[2, i]
         one = ONE / max(np.sqrt(square), TINY)
         for plane in range(3):
             means[plane, i] *= one
+    errors = 3 + len(r.albedo)
     for plane in range(len(means)):
         shown = _plane(r, plane, row)
         for i in range(width):
             value = means[plane, i] if work[TAKES, i] > ZERO else decoded(shown[begin + i])
+            if plane == errors and work[VALID, i] > ZERO:
+                value = min(value, most_deg)
             shown[begin + i] = encoded(ZERO if work[ZEROES, i] > ZERO else value, shown)
 
 

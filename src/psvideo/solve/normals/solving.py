@@ -22,6 +22,7 @@ from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Looks, Samples, Usable
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import Judging, emptied, judged, with_unchecked
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
@@ -173,6 +174,12 @@ def _usable(noise: PlateNoise, lit: Illumination, method: Method) -> Usable:
     """Return which measurements count: those that stand out of noise, and what else the method leaves out."""
     dark = CERTAIN * max(noise.dark * np.sqrt(lit.noise_shares[0]), noise.least)
     return Usable(dark_level=float(dark), shadow_ratio=INDIRECT if method == "robust" else 0.0)
+
+
+def most_claimed_deg(lights: int) -> float:
+    """Return the error that a trusted normal claims at most; infinity under three lights, whose errors hold what trust
+    does not go by."""
+    return Judging().most_error_deg if lights > ALL_EXPLAINED else float("inf")
 
 
 def trust_note(method: Method, lights: int) -> str:
