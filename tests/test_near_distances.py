@@ -115,8 +115,29 @@ def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
     assert near is not None
     depth_m = swept(near, rig.lights, plates).ground.depth_m
     assert np.median(np.abs(depth_m / -points[..., 2] - 1)[wall]) < 0.04
-    few = replace(rig, lights=rig.lights[:4])
-    assert swept(near, few.lights, plates[:4]) is near, "four lights do not tell distance from normal"
+    four = swept(near, rig.lights[::2], plates[::2]).ground
+    assert (four.depth_m == near.ground.depth_m).all(), "four lights do not tell distance from normal"
+    assert swept(near, rig.lights[:3], plates[:3]) is near, "and three not even where it is unsure"
+
+
+@pytest.mark.parametrize(("strength_off", "trusted"), [(0.0, 0.9), (0.02, 0.5)])
+def test_four_near_lights_do_not_vouch_for_a_wall_behind_the_plane(strength_off: float, trusted: float) -> None:
+    """On the plane its normals are off by some ten degrees. A subject that stands there is trusted, less of it where a
+    lamp is weaker than said, for then it may stand elsewhere."""
+    points, normals = surface(room)
+    rig = ring_rig(8, 2)
+    rig = replace(rig, lights=rig.lights[::2])
+    rng = np.random.default_rng(4)
+    plates = [plate + rng.normal(0, 0.0003, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    plates[0] *= np.float32(1 + strength_off)
+    found = ps.solve_images(np.stack(plates), rig)
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    cols = np.arange(SIZE)
+    wall = np.broadcast_to(np.abs(cols - MIDDLE) > 0.32 * SIZE, (SIZE, SIZE))
+    subject = np.broadcast_to(np.abs(cols - MIDDLE) < 0.2 * SIZE, (SIZE, SIZE))
+    assert np.median(apart[wall]) > 8
+    assert (found.valid & (apart > 10)).sum() < 0.03 * found.valid.sum(), "all of the wall was trusted"
+    assert found.valid[subject].mean() > trusted
 
 
 def test_one_clipped_channel_says_nothing_of_how_light_falls_off() -> None:

@@ -4,7 +4,7 @@ Near lights give the brightness of a point by its normal, its albedo and its dis
 measured than normal and albedo, and a wrong distance leaves a residual. So distances from half to twice and a half the
 rig's plane are tried on a rough grid, as space is swept in stereo (R. Collins, "A space-sweep approach to true
 multi-image matching", CVPR 1996), and the best is taken: a wall behind the subject is found to be one. What stands on
-the plane stays there.
+the plane stays there. Four lights only say where another distance would explain them as well or better.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,9 @@ from psvideo.solve.near_surface import NearSurface
 from psvideo.solve.normals.plate_noise import noise_of
 from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
 
-LIGHTS_FOR_SWEEPING = 5
-"""With four there is one number over for the distance, and nothing to see a highlight by."""
+LIGHTS_FOR_SWEEPING, LIGHTS_FOR_DOUBT = 5, 4
+"""With four there is one number over for the distance, and nothing to see a highlight by: a rig that is off by 2 % puts
+a part of the subject elsewhere. They say how unsure the plane's distance is, and no other one."""
 POINTS = 72
 """Points along the picture's longer side: distances are found for neighbourhoods."""
 RATIOS = np.geomspace(0.5, 2.5, 25)
@@ -50,17 +51,19 @@ JUMP = 0.08
 def swept(
     near: NearSurface, lights: Sequence[Light], plates: Plates, *, seen: NDArray[np.bool_] | None = None
 ) -> NearSurface:
-    """Return where the surface is by the lights' falloff; as it was with few lights, or where depth is known.
+    """Return where the surface is by the lights' falloff; as it was where depth is known, and with few lights, of which
+    four say how unsure it is.
 
     seen: (light, row) or (light, row, col), what was seen of the plates. Plates are on a scale on which 1 is clipped.
     """
-    if near.shaping.known_m is not None or sum(light.position_m is not None for light in lights) < LIGHTS_FOR_SWEEPING:
+    if near.shaping.known_m is not None or len(lights) < LIGHTS_FOR_DOUBT:
         return near
+    few = sum(light.position_m is not None for light in lights) < LIGHTS_FOR_SWEEPING
     rows, cols = near.ground.depth_m.shape
     fine = max(-(-max(rows, cols) // FINE_POINTS), 1)
     each = max(-(-max(rows, cols) // (POINTS * fine)), 1)
     light, dark = light_at(plates, fine, seen), noise_of(plates).dark
-    found = _distances(near.ground, lights, around(light, each), each * fine, noise=dark / each)
+    found = _distances(near.ground, lights, around(light, each), each * fine, noise=dark / each, few=few)
     if found is None:
         return near
     if found.on_plane:
@@ -86,18 +89,20 @@ class Distances:
 
 
 def _distances(
-    ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], step: int, *, noise: float
+    ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], step: int, *, noise: float, few: bool
 ) -> Distances | None:
-    """Return the distances of every ``step``-th row and column from their light (row, col, light); None where too few
-    lights reach anything."""
+    """Return the distances of every ``step``-th row and column from their light (row, col, light), those of the plane
+    under ``few`` lights; None where too few reach anything."""
     plane_m = ground.depth_m[::step, ::step].astype(np.float64)
     costs, reached = _costs(ground, lights, light, plane_m, step, noise=noise)
     if not reached.any():
         return None
     found = np.where(reached, plane_m * np.exp(_best(costs)), 0).astype(np.float32)
-    deep = np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
-    on_plane = _on_plane(deep / plane_m, reached, _jumps(deep))
+    deep = plane_m.astype(np.float32) if few else np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
+    on_plane = few or _on_plane(deep / plane_m, reached, _jumps(deep))
     unsure = _unsure(costs, len(lights), np.log(deep / plane_m), reached)
+    beside = cv2.dilate(unsure * reached, np.ones((AROUND, AROUND), np.uint8))
+    unsure = np.where(reached, unsure, np.maximum(unsure, beside))  # in shadow it may be any surface around
     return Distances(depth_m=deep, unsure=unsure, on_plane=on_plane)
 
 
