@@ -132,6 +132,20 @@ def test_rounding_is_found_in_what_lights_leave_over_as_well() -> None:
     assert noise_of(list(plates), LIT).at(0.4) == pytest.approx(float(np.sqrt(np.mean((plates - true) ** 2))), rel=0.3)
 
 
+@pytest.mark.parametrize("lit", [LIT, None], ids=["lights known", "no lights"])
+@pytest.mark.parametrize("side", [160, 260, 420])
+@pytest.mark.parametrize("cut_out", [False, True], ids=["black holds noise", "black is black"])
+def test_a_small_subject_before_black_is_as_noisy_as_it_is(
+    lit: Illumination | None, side: int, *, cut_out: bool
+) -> None:
+    """It is less than a twelfth of the picture, and files cut noise off at black."""
+    true = np.zeros((4, side, side))
+    true[:, 60:100, 60:100] = waves(0.8)[:, 40:80, 40:80]
+    noise = np.random.default_rng(3).normal(0, 0.002, true.shape)
+    plates = list(np.maximum(true + np.where(true > 0, 1.0, not cut_out) * noise, 0).astype(np.float32))
+    assert noise_of(plates, lit).at(0.4) == pytest.approx(0.002, rel=0.5)
+
+
 @pytest.mark.parametrize(("dark_rows", "looks"), [(0, 1), (64, 2)])
 def test_plates_are_looked_at_farther_apart_only_where_dark_shows_what_that_says(
     dark_rows: int, looks: int, monkeypatch: pytest.MonkeyPatch

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, rising_parts
 from psvideo.model.arrays import Doubles
@@ -23,6 +24,9 @@ LEVELS, LEAST_PIXELS, BRIGHT = 12, 512, 0.25
 """What is brighter than this share of the brightest level shows how noise grows with light."""
 DARK = 2.0
 """What is darker than this many standard deviations of the noise between neighbours shows noise without the picture."""
+LIT, LIT_SHARE, LIT_PIXELS = 6.0, 0.02, 64
+"""A small subject before black is what is brighter than this many such deviations (by chance no dark place is) and than
+this share of the brightest place. Every level of it is seen at this many places at least."""
 LEAST_SPREAD = 1.3
 """Chance, and the edges of what is lit, make differences from farther away larger by up to this."""
 TEXTURE = 0.3
@@ -120,11 +124,26 @@ def _left_over(of: Differences, matrix: Doubles) -> Differences:
 
 
 def _by_level(of: Differences) -> tuple[Doubles, Doubles]:
-    """Return LEVELS levels, and the variance there that differences show, each as large as noise at its level makes
-    it."""
+    """Return LEVELS levels or fewer, and the variance there that differences show, each as large as noise at its level
+    makes it.
+
+    Where all parts but the brightest are dark, what is lit is less than one part, and is shared out by itself.
+    """
     level = of.level.ravel()
-    parts = rising_parts(level, LEVELS)
-    at = np.array([(level[part[(len(part) - 1) // 2]] + level[part[len(part) // 2]]) / 2 for part in parts])  # medians
+    at, variances = _of_parts(of, level, rising_parts(level, LEVELS))
+    dark = float(np.sqrt(variances[:-1].max()))  # the darkest parts may be cut off at black
+    lit = np.flatnonzero(level > max(LIT * dark, LIT_SHARE * float(level.max())))
+    count = min(LEVELS - 1, len(lit) // LIT_PIXELS)
+    if at[-2] > DARK * dark or len(lit) * LEVELS > len(level) or count == 0:
+        return at, variances
+    unlit = np.flatnonzero(level <= DARK * dark)
+    shared = [*rising_parts(level[unlit], 1), *rising_parts(level[lit], count)]
+    return _of_parts(of, level, [some[part] for some, part in zip([unlit, *[lit] * count], shared, strict=True)])
+
+
+def _of_parts(of: Differences, level: Doubles, parts: Sequence[NDArray[np.intp]]) -> tuple[Doubles, Doubles]:
+    """Return the median level of parts whose levels rise, and the variance that differences show there."""
+    at = np.array([(level[part[(len(part) - 1) // 2]] + level[part[len(part) // 2]]) / 2 for part in parts])
     return at, np.array([of.variance(part) for part in parts])
 
 
@@ -153,7 +172,9 @@ class _Spread:
         bright = at > BRIGHT * at.max()
         if not bright.any():
             return cls(below=below, in_dark=far / near, in_light=far / near)
-        shown = median(_by_level(apart)[1][bright]) / max(median(variances[bright]), 1e-12)
+        at_apart, variances_apart = _by_level(apart)
+        bright_apart = at_apart > BRIGHT * at_apart.max()
+        shown = median(variances_apart[bright_apart]) / max(median(variances[bright]), 1e-12)
         return cls(below=below, in_dark=far / near, in_light=min(max(shown, 1.0), far / near))
 
     def times(self, levels: Doubles) -> Doubles:
