@@ -49,6 +49,31 @@ def test_gloss_and_saturation_are_weighed_out_of_a_matte_sphere() -> None:
     np.testing.assert_allclose([light.intensity for light in found], 1.0, rtol=0.01)
 
 
+@pytest.mark.parametrize(("radii", "within_deg"), [(50.0, 0.3), (25.0, 0.3), (5.0, 0.5)])
+def test_lamps_near_a_matte_sphere_are_where_they_stand(radii: float, within_deg: float) -> None:
+    """Taken for distant ones they seem to stand up to 1.3, 2.6 and 13 degrees from there."""
+    directions, strengths = ways(4), np.full((4, 3), 0.5)
+    pictures = sphere_pictures(directions, strengths, radii=radii)
+    found = measure_matte_sphere(
+        pictures, given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE), albedo=0.6
+    )
+    assert off_deg(np.array([light.direction for light in found]), directions).max() < within_deg
+    np.testing.assert_allclose([light.intensity for light in found], strengths, rtol=0.02)
+    np.testing.assert_allclose([1 / light.nearness for light in found], radii, rtol=0.2)
+
+
+@pytest.mark.parametrize("room", [0.03, 0.1, 0.3])
+def test_light_in_the_room_makes_lights_of_a_matte_sphere_doubted(room: float) -> None:
+    directions, strengths = ways(6), np.full((6, 3), 0.5)
+    pictures = sphere_pictures(directions, strengths, room=room)
+    found = measure_matte_sphere(pictures, given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE))
+    off = off_deg(np.array([light.direction for light in found]), directions)
+    assert off.max() > 1
+    assert all(light.fault or one < 2.5 * light.error_deg for light, one in zip(found, off, strict=True))
+    assert all("fades less towards its shadow" in light.fault for light in found if light.fault)
+    assert (np.median([light.flatter_deg for light in found]) > 2) == (room > 0.2), "then the command warns"
+
+
 @pytest.mark.campaign
 def test_a_wrong_outline_costs_what_the_standard_error_says() -> None:
     directions, strengths = ways(6), np.ones((6, 3))

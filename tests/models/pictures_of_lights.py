@@ -25,13 +25,17 @@ def ways(count: int, *, seed: int = 0) -> Array:
 
 def sphere_pictures(
     directions: Array, strengths: Array, *, view: SphereView = SphereView(focal_px=None, principal_px=(99.5, 74.5)),
-    noise: float = 0.002, gloss: float = 0.0,
+    noise: float = 0.002, gloss: float = 0.0, radii: float = np.inf, room: float = 0.0,
 ) -> LightPictures:  # fmt: skip
-    """A matte sphere, perhaps with a highlight, in the circle's outline; ``strengths`` (light, channel)."""
+    """A matte sphere, perhaps with a highlight, in the circle's outline; ``strengths`` (light, channel) at its middle,
+    from which lamps stand ``radii`` of it away. ``room``: light that comes from above as well."""
     place = given_outline(view, CIRCLE).place
     points = np.stack(np.meshgrid(np.arange(WIDE), np.arange(HIGH)), axis=-1).reshape(-1, 2).astype(float)
     normals, facing = sphere_normals(view, place, points)
-    shade = np.maximum(normals @ directions.T, 0) * (facing > 0)[:, None]
+    ways_to = directions - normals[:, None, :] / radii
+    falloff = np.linalg.norm(ways_to, axis=2) ** -3
+    shade = np.maximum((normals[:, None, :] * ways_to).sum(axis=2) * falloff, 0) * (facing > 0)[:, None]
+    shade += room * ((1 + normals[:, 1]) / 2 * (facing > 0))[:, None]
     half = directions + np.array([0.0, 0.0, 1.0])
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     spot = gloss * np.maximum(normals @ half.T, 0) ** 200 * (facing > 0)[:, None]

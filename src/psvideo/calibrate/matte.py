@@ -3,34 +3,30 @@
 Every pixel of the sphere has a known normal n, and a matte surface shows ``intensity * albedo * n . l``: linear in the
 light's strength times direction, thousands of pixels give it by least squares. Only the part that a light reaches well
 is used, and it is weighed robustly (Tukey; P. J. Huber, "Robust Statistics", 1981): near the terminator paint is not
-matte, light comes back from the surroundings, and gloss adds a spot. Errors come from leaving out one patch of the
-sphere after the other (jackknife), because what a real paint does otherwise is alike over whole patches, and from how
-well the outline is known. The sphere's albedo is the same for all lights: without it intensities are relative.
+matte, light comes back from the surroundings, and gloss adds a spot. A lamp that stands near shades the sphere
+otherwise, and is fitted as such (``matte_shading``). Errors come from leaving out one patch of the sphere after the
+other (jackknife), because what a real paint does otherwise is alike over whole patches, from how well the outline is
+known, and from how far a lamp would be elsewhere if the shading's shape were not known: rough paint and light in the
+room make it flatter. The sphere's albedo is the same for all lights: without it intensities are relative.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.calibrate.matte_shading import FLATTEST, LEAST_PIXELS, STEEPER_COSINE, MatteFit, MattePixels, matte_fit
 from psvideo.calibrate.sphere.outline import Outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.errors import PsvideoError
-from psvideo.model.arrays import Doubles
+from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.rig import Light, Rig
 
 INNER_DEG = 72.0
 """Pixels count whose normal turns from the viewing ray by less: the rim mixes with what is behind it."""
-LEAST_COSINE, STEEPER_COSINE = 0.1, 0.4
-"""Pixels count that a light reaches at 84 degrees from the normal or less. What changes when only those within 66 count
-goes into the error: no paint is quite matte."""
-TUKEY_WIDTH = 4.685
-ROUNDS = 12
 PATCHES, FEWEST_OF_A_PATCH = 4, 10
 """The jackknife leaves out one of this many times this many patches of the outline's square, of which so many pixels
 counted."""
-LEAST_PIXELS = 200
 MOST_PIXELS = 40_000
 MOST_LEFT = 0.1
 """Share of a light's brightness that may stay unexplained (median) before the sphere is called not matte."""
@@ -43,7 +39,9 @@ class MatteLight:
     """One light: direction with standard error, intensity per channel with relative standard error.
 
     ``left`` is the share of its brightness that a matte sphere does not explain (median), ``used`` the share of the
-    sphere's pixels that counted. ``fault`` says why the light is left out.
+    sphere's pixels that counted. ``nearness`` is the sphere's radius over the lamp's distance, 0 far away;
+    ``flatter_deg`` by how much the direction turns if the sphere may be shaded flatter than a matte one is. ``fault``
+    says why the light is left out.
     """
 
     name: str
@@ -53,17 +51,9 @@ class MatteLight:
     intensity_error: float
     left: float
     used: float
+    nearness: float = 0.0
+    flatter_deg: float = 0.0
     fault: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Sphere:
-    """Pixels of the sphere: normals (pixel, 3), which patch each belongs to, values (light, pixel, channel)."""
-
-    normals: Doubles
-    patch: NDArray[np.intp]
-    values: Doubles
-    usable: NDArray[np.bool_]
 
 
 def measure_matte_sphere(pictures: LightPictures, outline: Outline, *, albedo: float | None = None) -> list[MatteLight]:
@@ -79,7 +69,7 @@ def measure_matte_sphere(pictures: LightPictures, outline: Outline, *, albedo: f
             "or check its outline (`circle` x,y,radius)."
         )
     moved = [_pixels(pictures, outline.view, place) for place in _outlines_off(outline)]
-    found = [_light(name, n, sphere, moved) for n, name in enumerate(pictures.names)]
+    found = _all_as_flat([_light(name, n, sphere, moved) for n, name in enumerate(pictures.names)])
     good = [light.intensity for light in found if not light.fault]
     scale = 1 / albedo if albedo is not None else 1 / float(np.mean(good)) if good else 1.0
     return [replace(light, intensity=light.intensity * scale) for light in found]
@@ -116,7 +106,7 @@ def sphere_normals(view: SphereView, place: Doubles, points: Doubles) -> tuple[D
     return normals, facing
 
 
-def _pixels(pictures: LightPictures, view: SphereView, place: Doubles) -> _Sphere:
+def _pixels(pictures: LightPictures, view: SphereView, place: Doubles) -> MattePixels:
     """Take the sphere's pixels out of the pictures, evenly thinned where they are very many."""
     x, y, radius = place[:3]
     step = max(int(np.ceil(np.sqrt(np.pi * radius**2 / MOST_PIXELS))), 1)
@@ -131,7 +121,7 @@ def _pixels(pictures: LightPictures, view: SphereView, place: Doubles) -> _Spher
     clipped = pictures.saturated if pictures.saturated.ndim == 4 else pictures.saturated[..., None]
     across, down = ((points[kept] - [x, y]) / radius * 0.5 + 0.5).T
     patch = np.clip(across * PATCHES, 0, PATCHES - 1).astype(np.intp) * PATCHES
-    return _Sphere(
+    return MattePixels(
         normals=normals[kept],
         patch=patch + np.clip(down * PATCHES, 0, PATCHES - 1).astype(np.intp),
         values=images[:, row, col].astype(np.float64),
@@ -146,34 +136,45 @@ def _outlines_off(outline: Outline) -> list[Doubles]:
     return [outline.place + np.concatenate([move, [0.0, 0.0]]) for move in moves]
 
 
-def _light(name: str, n: int, sphere: _Sphere, moved: list[_Sphere]) -> MatteLight:
+def _light(name: str, n: int, sphere: MattePixels, moved: list[MattePixels]) -> MatteLight:
     everything = np.ones(len(sphere.normals), np.bool_)
-    strengths, left, lit = _fitted(sphere, n, everything)
-    total = strengths.sum(axis=0)
-    used = float(lit.mean())
+    found = matte_fit(sphere, n, everything)
+    total = found.total
     direction = total / max(float(np.linalg.norm(total)), 1e-12)
-    intensity = strengths @ direction
-    fault = _fault(sphere, n, lit, intensity, left)
+    light = MatteLight(
+        name=name, direction=direction, error_deg=180.0, intensity=found.strengths @ direction, intensity_error=1.0,
+        left=found.left, used=float(found.lit.mean()), nearness=found.nearness,
+    )  # fmt: skip
+    fault = _fault(sphere, n, found.lit, light.intensity, found.left)
     if fault:
-        return MatteLight(
-            name=name, direction=direction, error_deg=180.0, intensity=intensity, intensity_error=1.0, left=left,
-            used=used, fault=fault,
-        )  # fmt: skip
-    by_parts, by_outline = _covariances(sphere, n, moved, lit, total)
-    covariance = by_parts + by_outline
+        return replace(light, fault=fault)
+    by_parts, by_outline = _covariances(sphere, n, moved, found)
+    flatter = matte_fit(sphere, n, everything, flattest=FLATTEST).total - total
+    by_shape = np.outer(flatter, flatter)
+    covariance = by_parts + by_outline + by_shape
     length = float(np.linalg.norm(total))
-    error_deg = _turned_deg(covariance, direction, length)
-    contradicts = _turned_deg(by_parts, direction, length) > MOST_ERROR_DEG
-    return MatteLight(
-        name=name,
-        direction=direction,
+    parts_deg, shape_deg, error_deg = (_turned_deg(one, direction, length) for one in (by_parts, by_shape, covariance))
+    why = _TOO_FLAT if shape_deg > parts_deg else _CONTRADICTS if parts_deg > MOST_ERROR_DEG else _OUTLINE_UNSURE
+    return replace(
+        light,
         error_deg=error_deg,
-        intensity=intensity,
         intensity_error=float(np.sqrt(direction @ covariance @ direction) / length),
-        left=left,
-        used=used,
-        fault="" if error_deg <= MOST_ERROR_DEG else _CONTRADICTS if contradicts else _OUTLINE_UNSURE,
+        flatter_deg=shape_deg,
+        fault="" if error_deg <= MOST_ERROR_DEG else why,
     )
+
+
+def _all_as_flat(lights: list[MatteLight]) -> list[MatteLight]:
+    """Return lights whose errors hold at least what the sphere's shading is flatter by under all of them, root mean
+    square: paint and room are the same for all, and lights beside the camera's axis show them best."""
+    good = [light.flatter_deg for light in lights if not light.fault]
+    common = float(np.sqrt(np.mean(np.square(good)))) if good else 0.0
+    return [
+        light
+        if light.fault or light.flatter_deg >= common
+        else replace(light, error_deg=float(np.sqrt(light.error_deg**2 - light.flatter_deg**2 + common**2)))
+        for light in lights
+    ]
 
 
 def _turned_deg(covariance: Doubles, direction: Doubles, length: float) -> float:
@@ -182,16 +183,15 @@ def _turned_deg(covariance: Doubles, direction: Doubles, length: float) -> float
     return float(np.degrees(np.sqrt(np.trace(across @ covariance @ across)) / length))
 
 
-def _covariances(
-    sphere: _Sphere, n: int, moved: list[_Sphere], lit: NDArray[np.bool_], total: Doubles
-) -> tuple[Doubles, Doubles]:
-    """Return the covariance (3, 3) of a light's direction times its intensity, ``total``: how it changes as patches are
-    left out one by one and as only what is well lit counts; and as the outline is moved by its own error."""
-    everything = np.ones(len(sphere.normals), np.bool_)
-    patches = [patch for patch in np.unique(sphere.patch) if (lit & (sphere.patch == patch)).sum() >= FEWEST_OF_A_PATCH]
-    without = [_fitted(sphere, n, sphere.patch != patch)[0].sum(axis=0) for patch in patches]
-    well_lit = _fitted(sphere, n, everything, least_cosine=STEEPER_COSINE)[0].sum(axis=0)
-    off = [_fitted(one, n, np.ones(len(one.normals), np.bool_))[0].sum(axis=0) for one in moved]
+def _covariances(sphere: MattePixels, n: int, moved: list[MattePixels], found: MatteFit) -> tuple[Doubles, Doubles]:
+    """Return the covariance (3, 3) of a light's direction times its intensity: how it changes as patches are left out
+    one by one and as only what is well lit counts; and as the outline is moved by its own error."""
+    everything, total = np.ones(len(sphere.normals), np.bool_), found.total
+    counted = np.bincount(sphere.patch[found.lit], minlength=PATCHES**2)
+    patches = np.flatnonzero(counted >= FEWEST_OF_A_PATCH)
+    without = [matte_fit(sphere, n, sphere.patch != patch).total for patch in patches]
+    well_lit = matte_fit(sphere, n, everything, least_cosine=STEEPER_COSINE).total
+    off = [matte_fit(one, n, np.ones(len(one.normals), np.bool_)).total for one in moved]
     count = max(len(patches), 1)
     spread = np.array([one - total for one in without])
     by_parts: Doubles = (count - 1) / count * spread.T @ spread + np.outer(well_lit - total, well_lit - total)
@@ -200,10 +200,14 @@ def _covariances(
 
 
 _OUTLINE_UNSURE = "where the sphere's outline is, is not known well enough to say where the light is"
+_TOO_FLAT = (
+    "it fades less towards its shadow than a matte sphere does under one lamp: light in the room (a picture named "
+    "ambient takes it off), another curve (`transfer`), or no matte paint"
+)
 _CONTRADICTS = "its parts contradict each other: what is inside the outline is no matte sphere of one colour"
 
 
-def _fault(sphere: _Sphere, n: int, lit: NDArray[np.bool_], intensity: Doubles, left: float) -> str:
+def _fault(sphere: MattePixels, n: int, lit: Mask, intensity: Doubles, left: float) -> str:
     if intensity.min() <= 0 or lit.sum() < LEAST_PIXELS:
         clipped = 1 - sphere.usable[n].mean()
         why = f"{clipped:.0%} of the sphere is saturated" if clipped > 0.2 else "it hardly lights the sphere"
@@ -214,42 +218,3 @@ def _fault(sphere: _Sphere, n: int, lit: NDArray[np.bool_], intensity: Doubles, 
             "wrong, or other light falls on it"
         )
     return ""
-
-
-def _fitted(
-    sphere: _Sphere, n: int, chosen: NDArray[np.bool_], *, least_cosine: float = LEAST_COSINE
-) -> tuple[Doubles, float, NDArray[np.bool_]]:
-    """Return one light's strength times direction per channel (channel, 3), the unexplained share, and what counted.
-
-    The brightest half begins; then all that the light reaches well counts, weighed by how well it fits.
-    """
-    normals, values = sphere.normals, sphere.values[n]
-    bright = values.sum(axis=1)
-    usable = sphere.usable[n] & chosen
-    if usable.sum() < LEAST_PIXELS:
-        return np.zeros((values.shape[1], 3)), 1.0, np.zeros_like(usable)
-    vector: Doubles = np.zeros(3)
-    lit = usable & (bright > 0.5 * np.quantile(bright[usable], 0.98))
-    weight = lit.astype(np.float64)
-    for _ in range(ROUNDS):
-        vector = _solved(normals, bright, weight)
-        length = float(np.linalg.norm(vector))
-        shade = normals @ vector
-        lit = usable & (shade > least_cosine * length)
-        if lit.sum() < LEAST_PIXELS or length <= 0:
-            return np.zeros((values.shape[1], 3)), 1.0, lit
-        residual = bright - shade
-        scale = 1.4826 * float(np.median(np.abs(residual[lit]))) + 1e-3 * length
-        weight = np.where(lit, np.maximum(1 - (residual / (TUKEY_WIDTH * scale)) ** 2, 0) ** 2, 0.0)
-    direction = vector / length
-    # one direction for all channels: coloured gloss must not turn one channel against the others
-    cosine = normals @ direction
-    strengths = (weight * cosine) @ values / float(weight @ cosine**2)
-    left = float(np.median(np.abs(residual[lit]) / shade[lit]))
-    return np.outer(strengths, direction), left, lit
-
-
-def _solved(normals: Doubles, values: Doubles, weight: Doubles) -> Doubles:
-    weighted = normals * weight[:, None]
-    vector: Doubles = np.linalg.lstsq(weighted.T @ normals, weighted.T @ values, rcond=None)[0].astype(np.float64)
-    return vector

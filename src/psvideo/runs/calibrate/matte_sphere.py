@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.matte import MatteLight, matte_rig, measure_matte_sphere
 from psvideo.calibrate.sphere.marked import held_against_picture
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, given_outline
 from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.ranks import median
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.screen_pictures import write_png
@@ -24,6 +27,9 @@ from psvideo.runs.calibrate.reading import (
     rig_out,
 )
 from psvideo.runs.steps.caller import PYTHON, Caller
+
+FLATTER_DEG = 2.0
+"""From here on shading that is flatter than a matte sphere's is warned of."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +96,13 @@ def matte_sphere(
     for light in lights:
         if light.fault:
             caller.warn(f"light {light.name!r} is left out of the rig: {light.fault}")
+    flatter_deg = median(np.array([light.flatter_deg for light in lights if not light.fault]))
+    if flatter_deg > FLATTER_DEG:
+        caller.warn(
+            f"the sphere fades less towards its shadow than a matte one does under one lamp, which may turn directions "
+            f"by about {flatter_deg:.0f} degrees: light in the room that was not taken off (a picture with all lamps "
+            "off, named ambient, does it), pictures under another curve than `transfer` says, or rough paint"
+        )
     if focal_px is None:
         caller.warn(
             "the focal length is not known, so the view is assumed orthographic, and all directions are wrong by "

@@ -17,6 +17,9 @@ from psvideo.model.units import counted
 if TYPE_CHECKING:
     from psvideo.calibrate.matte import MatteLight
 
+NEAR = 0.01
+"""A lamp at 100 radii of the sphere and farther is far away."""
+
 
 @spread
 def matte_sphere(
@@ -71,9 +74,10 @@ def _matte_line(light: MatteLight) -> str:
         return f"  {light.name:12} left out: {light.fault}"
     where = ", ".join(f"{value:+.4f}" for value in light.direction)
     strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
+    near = f"; {1 / light.nearness:.0f} radii of the sphere away" if light.nearness > NEAR else ""
     return (
         f"  {light.name:12} direction {where}  +- {light.error_deg:.2f} degrees; intensity {strengths}  "
-        f"+- {light.intensity_error:.1%}"
+        f"+- {light.intensity_error:.1%}{near}"
     )
 
 
@@ -84,5 +88,6 @@ def _matte_record(light: MatteLight) -> dict[str, object]:
         "error_deg": light.error_deg,
         "intensity": light.intensity.tolist(),
         "intensity_error": light.intensity_error,
+        "distance_radii": 1 / light.nearness if light.nearness > NEAR else None,
         "fault": light.fault or None,
     }
