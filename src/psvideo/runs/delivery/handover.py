@@ -75,10 +75,12 @@ def write_previews(
             )
             for number in numbers
         ]
-        for each in CODECS[codec]:
-            path = run.folder / preview_name(run.clip.name, preview, MOVIE_SUFFIXES[each])
-            if instants and not path.is_file():
-                write_preview(path, preview, instants, fps=run.fps, codec=each, watch=watch)
+        paths = {
+            each: run.folder / preview_name(run.clip.name, preview, MOVIE_SUFFIXES[each]) for each in CODECS[codec]
+        }
+        missing = {each: path for each, path in paths.items() if not path.is_file()}
+        if instants and missing:
+            write_preview(missing, preview, instants, fps=run.fps, watch=watch)
     shutil.rmtree(run.folder / KEPT, ignore_errors=True)
 
 

@@ -47,16 +47,17 @@ def preview_name(clip: str, preview: Preview, suffix: str) -> str:
 
 
 def write_preview(
-    path: Path, preview: Preview, instants: Sequence[PreviewedInstant], *, fps: Fraction, codec: Codec, watch: Watch
+    paths: Mapping[Codec, Path], preview: Preview, instants: Sequence[PreviewedInstant], *, fps: Fraction, watch: Watch
 ) -> None:
-    """Write one movie of the instants, in the order of their numbers; a number that is not there holds the one before.
+    """Write one movie of the instants, in the order of their numbers, in one coding or several; a number that is not
+    there holds the one before.
 
     How bright pictures are shown is set by the first instant, for the whole movie. A lone instant is relit for one
     turn of the light.
     """
     from psvideo.export.preview_movie import (  # FFmpeg's libraries take memory: only where a movie is made
         even,
-        write_movie,
+        write_movies,
     )
 
     exposure = _exposure(preview, instants[0])
@@ -73,7 +74,7 @@ def write_preview(
             for _ in range(one.number, after):
                 yield shown
 
-    write_movie(path, pictures(), fps=fps, codec=codec)
+    write_movies(paths, pictures(), fps=fps)
 
 
 def _exposure(preview: Preview, first: PreviewedInstant) -> float:
