@@ -72,6 +72,27 @@ def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s
     assert "camera axes" in known
 
 
+@pytest.mark.parametrize("slopes", [0.05, -0.2])
+def test_where_near_lights_do_not_say_how_far_the_subject_is_the_rig_is_not_blamed_alone(slopes: float) -> None:
+    for unknown, said in ((0.8, True), (0.2, False)):
+        one = Footage(solved=True).observed(0)
+        one.closely.slopes[:] = [slopes]
+        misfit = Misfit(share=0.01, error_deg=1.0, distance_share=unknown)
+        one.facts = KeptFacts(replace(facts, misfit=misfit) for facts in one.facts)
+        (line,) = (each for each in judge_rig(one) if "one surface" in each.found)
+        assert ("may stand elsewhere" in line.found) == ("once the distance is known" in line.advice) == said
+        assert line.grade == ("bad" if slopes < 0 and not said else "doubtful")
+
+
+@pytest.mark.parametrize(("moving_share", "doubted"), [(0.0, True), (0.3, False)])
+def test_normals_that_lean_while_the_picture_moves_say_nothing_of_the_rig(moving_share: float, doubted: bool) -> None:
+    """Of a subject that stops and goes most rounds are at rest, and the one that was looked at may not be."""
+    one = Footage(solved=True).observed(0)
+    turn_deg = (12.0, 9.0, -8.0)
+    one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=turn_deg, rest_deg=18.0, moving_share=moving_share)]
+    assert any("tilted otherwise" in line.found for line in rig_of(one)) == doubted
+
+
 def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_not_blamed_alone() -> None:
     one = Footage(solved=True).observed(0)
     one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(20.0, 0.0, 0.0), rest_deg=0.2)]

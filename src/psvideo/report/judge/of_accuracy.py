@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.typical_error import (
     COMMON_DEG,
     LOST_DEG,
     by_noise_deg,
     by_slope_deg,
+    distance_unknown_share,
     moves,
     off_deg,
     rig_explains,
@@ -109,8 +108,7 @@ def _why_off(observed: Observed) -> tuple[str, str]:
 
 def distance(observed: Observed) -> Iterator[Judgement]:
     """Judge how much of the subject lies where near lights' distance is not known, which is no fault of its surface."""
-    known = [one.misfit.distance_share for one in observed.facts if one.misfit is not None]
-    share = float(np.median(known)) if known else 0.0
+    share = distance_unknown_share(observed)
     if share > UNKNOWN_DISTANCE:
         yield Judgement(
             subject="distance",

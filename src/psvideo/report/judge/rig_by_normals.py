@@ -5,7 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from psvideo.report.judge.of_exposure import LOST_CLIPPED
-from psvideo.report.judge.typical_error import AT_REST, LOST_DEG, NOISY_DEG, by_noise_deg, moves, off_deg
+from psvideo.report.judge.typical_error import (
+    AT_REST,
+    LOST_DEG,
+    NOISY_DEG,
+    by_noise_deg,
+    distance_unknown_share,
+    moves,
+    off_deg,
+)
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
@@ -17,6 +25,9 @@ directions are right, and what shines explains the rest (a coin of metal under 6
 0.05; the same lights off by 10 degrees each: 0.91 and 0.24, by 20 degrees: 0.77 and 0.31)."""
 AGREE, DISAGREE = 0.3, -0.1
 """Slopes that agree by less than the first are hardly those of one surface; by less than the second, surely not."""
+ELSEWHERE = 0.5
+"""Where near lights' distance is not known in more of the subject than this, normals are first turned by that: under a
+right rig, slopes of a ball before a wall agreed by 0.03 to 0.09 under 5 and 8 lights at half to one of its widths."""
 MOST_AWAY = 0.05
 """Of measured normals, the share that may face away from the camera: what a camera sees faces it."""
 OUTWARD, SURELY_OUTWARD = 0.55, 0.7
@@ -89,12 +100,16 @@ def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
             advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
             "lights as the plan does. If it does, add lights.",
         )
+    elsewhere = distance_unknown_share(observed) > ELSEWHERE
+    of_distance = "most of it may stand elsewhere than it is taken to (see the line on distance), or "
     return Judgement(
         subject="rig",
-        grade=grade,
-        found=f"{cannot}: directions are mirrored or turned, or lights exchanged.{_as_it_is_seen(observed)}",
-        advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
-        "lights as the plan does; calibrate again if anything was moved.",
+        grade="doubtful" if elsewhere else grade,
+        found=f"{cannot}: {of_distance if elsewhere else ''}directions are mirrored or turned, or lights exchanged."
+        f"{_as_it_is_seen(observed)}",
+        advice=("If the line stays once the distance is known, check" if elsewhere else "Check") + " that the rig file "
+        "is in camera axes (x right, y up), belongs to this set-up, and names the lights as the plan does; calibrate "
+        "again if anything was moved.",
     )
 
 
@@ -202,9 +217,10 @@ def facing_away(observed: Observed) -> Judgement | None:
 
 def normals_lean(observed: Observed) -> Judgement | None:
     """Judge whether the normals would be one surface's if all were tilted alike; None where not."""
-    if not observed.closely.leans or not quiet(observed.facts) or moves(observed.facts) or _clips(observed):
+    at_rest = [one for one in observed.closely.leans if one.moving_share <= AT_REST]  # false motion leans normals, too
+    if not at_rest or not quiet(observed.facts) or moves(observed.facts) or _clips(observed):
         return None
-    usual = sorted(observed.closely.leans, key=lambda one: one.lean_deg)[len(observed.closely.leans) // 2]
+    usual = sorted(at_rest, key=lambda one: one.lean_deg)[len(at_rest) // 2]
     shown_deg = off_deg(observed) or 0.0
     if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= BY_LEANING:
         return None

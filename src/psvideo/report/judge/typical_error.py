@@ -41,6 +41,12 @@ def by_noise_deg(facts: Sequence[InstantFacts]) -> float:
     return MEAN_OF_HELD * float(np.median(known)) if known else 0.0
 
 
+def distance_unknown_share(observed: Observed) -> float:
+    """Return in which share of the subject near lights' distance is not known."""
+    known = [one.misfit.distance_share for one in observed.facts if one.misfit is not None]
+    return float(np.median(known)) if known else 0.0
+
+
 def by_slope_deg(facts: Sequence[InstantFacts]) -> float:
     """Return by how much typical normals are turned, in the mean, as albedo that goes with the slope shows it; 0 where
     nothing does."""

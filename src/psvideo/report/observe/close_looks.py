@@ -1,7 +1,7 @@
 """What takes longer to look at than every round allows: sharpness, noise, slopes, the rig's lean, shadows."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 from psvideo.model.surface import Surface
 from psvideo.plates.sequence import Round
@@ -54,14 +54,15 @@ class CloseLooks:
             self.noises.append(noise)
 
     def look_at_surface(
-        self, surface: Surface, some: Surface | None, seen: Seen, *, lights: int, lens: Lens | None
+        self, surface: Surface, some: Surface | None, seen: Seen, *, lights: int, lens: Lens | None, moving_share: float
     ) -> Iterator[None]:
-        """Look whether normals are one surface's under a rig that is right; ``some`` is the surface, thinned."""
+        """Look whether normals are one surface's under a rig that is right; ``some`` is the surface, thinned, and
+        ``moving_share`` how much of the picture moves."""
         small = self.look_at_slopes(surface, some, lights=lights)
         yield
         found = lean(small, lens=lens)
         if found is not None:
-            self.leans.append(found)
+            self.leans.append(replace(found, moving_share=moving_share))
         self.look_at_outline(thin_surface(surface) if some is None else some, seen)
 
     def look_at_slopes(self, surface: Surface, some: Surface | None = None, *, lights: int) -> Averaged:

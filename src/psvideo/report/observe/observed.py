@@ -206,7 +206,12 @@ class Observed:
         yield from self.closely.look_at_plates(one, seen, watched=self.motion.watched)
         yield
         if surface is not None:
-            yield from self.closely.look_at_surface(surface, some, seen, lights=len(self.lights), lens=self.lens)
+            yield from self.closely.look_at_surface(
+                *(surface, some, seen),
+                lights=len(self.lights),
+                lens=self.lens,
+                moving_share=self.facts[-1].moving_share or 0.0,
+            )
             yield
             if points is not None:
                 self.closely.look_into_shadow(surface, seen, points)

@@ -53,7 +53,8 @@ class Lean:
     leaves over than the normals as they are, as a share of what it leaves. ``turn_deg`` (x, y, z) is the turn in it,
     the axis times the angle, and ``rest_deg`` how far what is no turn turns a normal in the mean. ``off_axis`` is how
     far from the picture's middle its axis would lie, in widths of the picture, if that were to explain what it can, and
-    ``least_deg`` the lean that is left then; both are None where the lens is known."""
+    ``least_deg`` the lean that is left then; both are None where the lens is known. ``moving_share`` is how much of the
+    picture moved meanwhile."""
 
     lean_deg: float
     gain: float
@@ -61,6 +62,7 @@ class Lean:
     rest_deg: float
     off_axis: float | None = None
     least_deg: float | None = None
+    moving_share: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
