@@ -24,7 +24,8 @@ from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard, build
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Playwright
+    from playwright.sync_api import Browser, Playwright
+    from watched_page import Watched
 
 settings.register_profile(
     "suite", derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow]
@@ -61,6 +62,28 @@ def chromium() -> str:
     if program is None:
         pytest.fail("this test needs a Chromium browser: Debian's package chromium (tests/install.sh installs it)")
     return program
+
+
+@pytest.fixture(scope="session")
+def browser(playwright: "Playwright", chromium: str) -> "Iterator[Browser]":
+    """A browser that draws by software and asks nobody but the page's server."""
+    from watched_page import ALONE
+
+    started = playwright.chromium.launch(executable_path=chromium, headless=True, args=ALONE)
+    yield started
+    started.close()
+
+
+@pytest.fixture
+def watched(browser: "Browser") -> "Iterator[Watched]":
+    """A small browser window, of which nothing may have been complained when the test ends."""
+    from watched_page import SMALL, Watched
+
+    context = browser.new_context(viewport=SMALL, has_touch=True)
+    one = Watched(context.new_page())
+    yield one
+    context.close()
+    assert not one.complaints
 
 
 @pytest.fixture(scope="session")

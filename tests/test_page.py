@@ -1,12 +1,8 @@
-"""The page in a real browser: light is right to a thousandth, controls do what they say, no other host is asked."""
+"""The page in a real browser: controls do what they say, what is named is shown, no other host is asked."""
 
 from __future__ import annotations
 
-import base64
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,40 +10,14 @@ import cv2
 import numpy as np
 import page_folder as small
 import pytest
+from watched_page import SMALL, Watched, albedo, canvas_pixel, light, serving, settled, shown
 
-from psvideo.errors import UsageError
-from psvideo.page import page_server, show_of, side_by_side, write_single_page
 from psvideo.page.serving import PageServer
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Playwright, ViewportSize
+    from playwright.sync_api import Browser, Page, ViewportSize
 
-ASSETS = Path(__file__).resolve().parents[1] / "src" / "psvideo" / "page" / "assets"
-ALONE = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 LAPTOP: ViewportSize = {"width": 1366, "height": 768}
-SMALL: ViewportSize = {"width": 760, "height": 480}
-"""Software rendering takes its time over every pixel."""
-PATIENCE_MS = 60_000
-KEY, RIM = (0.3, 0.8, 0.5), (-0.9, -0.2, 0.1)
-ORANGE = np.array([1.0, ((0x80 / 255 + 0.055) / 1.055) ** 2.4, 0.0])
-"""#ff8000 in linear light (IEC 61966-2-1)."""
-
-
-@pytest.fixture(scope="session")
-def browser(playwright: Playwright, chromium: str) -> Iterator[Browser]:
-    started = playwright.chromium.launch(executable_path=chromium, headless=True, args=ALONE)
-    yield started
-    started.close()
 
 
 @pytest.fixture(scope="module")
@@ -58,157 +28,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-@contextmanager
-def serving(folder: Path) -> Iterator[PageServer]:
-    with page_server(show_of(folder), port=0) as one:
-        thread = threading.Thread(target=one.serve_forever)
-        thread.start()
-        yield one
-        one.shutdown()
-        thread.join()
-
-
 @pytest.fixture(scope="module")
 def server(folder: Path) -> Iterator[PageServer]:
     with serving(folder) as one:
         yield one
-
-
-class Watched:
-    """A page, and everything that it complained of or asked for."""
-
-    def __init__(self, page: Page) -> None:
-        self.page = page
-        self.complaints: list[str] = []
-        self.asked: list[str] = []
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("console", lambda message: self.complaints.append(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("request", lambda request: self.asked.append(request.url))
-
-    def open(self, url: str) -> Page:
-        self.page.goto(url)
-        self.page.wait_for_selector("body[data-ready=true]")
-        return self.page
-
-
-@pytest.fixture
-def watched(browser: Browser) -> Iterator[Watched]:
-    context = browser.new_context(viewport=SMALL, has_touch=True)
-    one = Watched(context.new_page())
-    yield one
-    context.close()
-    assert not one.complaints
-
-
-def shown(page: Page, number: int) -> None:
-    page.wait_for_selector(f"body[data-shown='{number}']")
-
-
-def settled(page: Page) -> None:
-    """Wait until what was asked for is drawn."""
-    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def light(direction: tuple[float, float, float], **more: object) -> dict[str, object]:
-    unit = (np.array(direction) / np.linalg.norm(direction)).tolist()
-    return {"place": 0, "name": "L", "direction": unit, "colour": "#ffffff", "intensity": 1, "near": False} | more
-
-
-def relit_in(page: Page, **state: object) -> np.ndarray:
-    """Return the relit light (row, col, 3) as floats, read back from the graphics processor."""
-    page.evaluate("state => psvideo.change(state)", state)
-    page.wait_for_function("() => !psvideo.loader.loading")
-    found = page.evaluate("() => { const f = psvideo.relitValues(); return [f.width, f.height, Array.from(f.values)] }")
-    return np.array(found[2], np.float64).reshape(found[1], found[0], 4)[..., :3]
-
-
-def albedo() -> np.ndarray:
-    return small.albedo(small.FIRST).astype(np.float16).astype(np.float64)
-
-
-def lambert(direction: tuple[float, float, float]) -> np.ndarray:
-    """Return n . l, and 0 on the far side, (row, col, 1), from the ball's equation."""
-    unit = np.array(direction) / np.linalg.norm(direction)
-    light: np.ndarray = np.maximum(small.ball()[0].astype(np.float64) @ unit, 0)[..., None]
-    return light
-
-
-@pytest.mark.parametrize(("y", "world"), [("up", False), ("down", False), ("up", True), ("down", True)])
-def test_relit_light_is_albedo_times_n_dot_l_in_every_space_and_whichever_way_y_points(
-    y: str, world: bool, tmp_path: Path, watched: Watched
-) -> None:
-    with serving(small.results(tmp_path / "out", y=y, world=world)) as server:
-        page = watched.open(server.url)
-        found = relit_in(page, lights=[light(KEY), light(RIM, colour="#ff8000", intensity=0.7)])
-    true = albedo() * (lambert(KEY) + 0.7 * ORANGE * lambert(RIM))
-    assert np.abs(found - true).max() <= 1e-3
-    assert true.max() > 0.5
-
-
-@pytest.mark.parametrize("world", [False, True])
-def test_a_near_light_falls_off_with_the_square_of_its_distance_to_every_point(
-    world: bool, tmp_path: Path, watched: Watched
-) -> None:
-    """Points in widths of the picture from their median, as the page says; the position pass is in metres."""
-    with serving(small.results(tmp_path / "out", world=world, position=True)) as server:
-        page = watched.open(server.url)
-        found = relit_in(page, lights=[light(KEY, near=True, distance=0.6)])
-    normals, inside = small.ball()
-    points = small.points() / small.SCALE_M
-    points -= np.median(points[inside], axis=0)
-    lamp = 0.6 * np.array(KEY) / np.linalg.norm(KEY)
-    away = lamp - points
-    reach = np.linalg.norm(away, axis=-1)
-    facing = np.maximum((normals * away).sum(axis=-1) / reach, 0)
-    true = albedo() * (facing * (0.6 / reach) ** 2)[..., None]
-    assert np.abs(found - true)[inside].max() < 1e-3
-    flat = albedo() * lambert(KEY)
-    assert np.abs(flat - true)[inside].mean() > 0.2 * true[inside].mean()
-
-
-def test_a_highlight_is_blinns(server: PageServer, watched: Watched) -> None:
-    found = relit_in(watched.open(server.url), lights=[light(KEY)], specular=0.4, exponent=20)
-    unit = np.array(KEY) / np.linalg.norm(KEY)
-    half = unit + np.array([0, 0, 1])
-    half /= np.linalg.norm(half)
-    normals = small.ball()[0].astype(np.float64)
-    shine = 0.4 * np.maximum(normals @ half, 0) ** 20 * (normals @ unit > 0)
-    true = albedo() * lambert(KEY) + shine[..., None]
-    near = np.abs(normals @ unit) > 0.01  # at the edge of its own shadow the highlight ends at once
-    assert np.abs(found - true)[near].max() <= 4e-3  # the 20th power of a half float
-
-
-def around_in(page: Page, name: str, directions: np.ndarray) -> np.ndarray:
-    """Return the light (n, 3) that comes from directions (n, 3), as the page's own file defines it."""
-    source = base64.b64encode((ASSETS / "around.js").read_bytes()).decode()
-    script = "async ([source, name, all]) => { const made = await import(`data:text/javascript;base64,${source}`);"
-    found = page.evaluate(
-        f"{script} return all.map((one) => made.radianceOf(name, one)); }}", [source, name, directions.tolist()]
-    )
-    return np.array(found)
-
-
-@pytest.mark.parametrize(("name", "turn_deg"), [("studio", 0), ("window", 50)])
-def test_light_from_all_around_is_what_a_matte_surface_gathers(
-    name: str, turn_deg: float, server: PageServer, watched: Watched
-) -> None:
-    """Gathered direction by direction, from surroundings that are turned about the upright axis."""
-    polar, across = np.meshgrid((np.arange(40) + 0.5) * np.pi / 40, (np.arange(80) + 0.5) * np.pi / 40, indexing="ij")
-    level = np.sin(polar)
-    there = np.stack([level * np.sin(across), np.cos(polar), level * np.cos(across)], axis=-1).reshape(-1, 3)
-    watched.page.goto("about:blank")
-    radiance = around_in(watched.page, name, there) * (level.ravel() * (np.pi / 40) ** 2)[:, None]
-    cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
-    turned = there @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
-    normals, inside = small.ball()
-    gathered = np.maximum(normals.astype(np.float64) @ turned.T, 0) @ radiance / np.pi
-    page = watched.open(server.url)
-    found = relit_in(page, lights=[], around=name, aroundTurn=turn_deg, aroundStrength=1)
-    true = albedo() * gathered
-    error = np.abs(found - true)[inside]
-    assert error.mean() < 0.03 * true[inside].max(), "two degrees of the harmonics leave 1 % on average"
-    assert error.max() < 0.1 * true[inside].max(), "and 9 % at most (Ramamoorthi and Hanrahan 2001)"
 
 
 def test_it_scrubs_plays_and_takes_lights_by_mouse_finger_and_keys(server: PageServer, watched: Watched) -> None:
@@ -344,24 +167,6 @@ def test_a_corrupt_picture_says_so_in_its_pane_and_the_others_are_shown(server: 
     message.wait_for(state="hidden")
 
 
-def canvas_pixel(page: Page, right: float, down: float) -> list[int]:
-    """Return the colour that the screen shows at a share of the viewer's width and height."""
-    return list(
-        page.evaluate(
-            """async ([right, down]) => {
-              psvideo.drawNow();
-              const canvas = document.getElementById("picture");
-              const copy = document.createElement("canvas");
-              copy.width = canvas.width; copy.height = canvas.height;
-              const pen = copy.getContext("2d");
-              pen.drawImage(canvas, 0, 0);
-              return Array.from(pen.getImageData(right * canvas.width, down * canvas.height, 1, 1).data);
-            }""",
-            [right, down],
-        )
-    )
-
-
 def test_views_are_chosen_by_keys_and_show_what_they_name(server: PageServer, watched: Watched) -> None:
     page = watched.open(server.url)
     for key, layout, panes in (("s", "one", 1), ("f", "four", 4), ("w", "wipe", 2), ("d", "two", 2), ("s", "one", 1)):
@@ -463,70 +268,6 @@ CONTRAST_BELOW = """least => {
     }).filter(([, contrast]) => contrast < least);
 }"""
 """Texts whose contrast to their ground is below a bar (WCAG 2.2, 1.4.3)."""
-
-
-def test_one_file_opens_by_itself_and_relights_alike(folder: Path, tmp_path: Path, watched: Watched) -> None:
-    page_file = tmp_path / "page.html"
-    held = write_single_page(show_of(folder), page_file, width_px=640, count=3)
-    assert (held.pictures, held.missing, held.width_px) == (12, 0, small.COLS)
-    assert held.total_bytes == page_file.stat().st_size
-    text = page_file.read_text()
-    assert str(tmp_path) not in text
-    assert str(folder) not in text
-    page = watched.open(page_file.as_uri())
-    found = relit_in(page, lights=[light(KEY)])
-    assert np.abs(found - albedo() * lambert(KEY)).max() <= 1e-3
-    page.keyboard.press("End")
-    shown(page, 1006)
-    page.keyboard.press("t")
-    page.wait_for_selector("#timing-facts dt")
-    assert [url for url in watched.asked if not url.startswith("data:")] == [page_file.as_uri()]
-
-
-@pytest.mark.parametrize("in_one_file", [False, True])
-def test_results_side_by_side_are_each_relit_as_they_are_under_the_same_light(
-    in_one_file: bool, folder: Path, tmp_path: Path, watched: Watched
-) -> None:
-    other = small.results(tmp_path / "other", y="down", world=True)
-    for file in other.glob("albedo/*.exr"):
-        small.write(file, small.rgb(np.full((small.ROWS, small.COLS, 3), 0.25)), int(file.stem[-4:]))
-    show = side_by_side([show_of(folder), show_of(other)], [folder, other])
-    assert [one.group for one in show.sequences] == ["out"] * 4 + ["other"] * 4
-    with page_server(show, port=0) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        write_single_page(show, tmp_path / "page.html", width_px=640, count=3)
-        page = watched.open((tmp_path / "page.html").as_uri() if in_one_file else server.url)
-        assert page.evaluate("() => psvideo.panes()") == ["relit", "r2.relit"]
-        assert np.abs(relit_in(page, lights=[light(KEY)]) - albedo() * lambert(KEY)).max() <= 1e-3
-        found = page.evaluate("() => Array.from(psvideo.relitValues('r2.relit').values)")
-        second = np.array(found).reshape(small.ROWS, small.COLS, 4)[..., :3]
-        assert np.abs(second - 0.25 * lambert(KEY)).max() <= 1e-3
-        settled(page)
-        assert page.locator(".caption").all_inner_texts() == ["out · 1001", "other · 1001 · world space · y down"]
-        server.shutdown()
-        thread.join()
-
-
-@pytest.mark.parametrize(("fps", "shown"), [(1 / 12, False), (24.0, True)])
-def test_results_of_photographs_have_no_time(
-    fps: float, shown: bool, folder: Path, tmp_path: Path, watched: Watched
-) -> None:
-    write_single_page(replace(show_of(folder), fps=fps), tmp_path / "page.html", width_px=64, count=small.COUNT)
-    page = watched.open((tmp_path / "page.html").as_uri())
-    assert [bool(page.locator(f"#{name}").inner_text()) for name in ("clock", "rate")] == [shown, shown]
-
-
-def test_what_cannot_stand_side_by_side_is_named(folder: Path, tmp_path: Path) -> None:
-    one = show_of(folder)
-    with pytest.raises(UsageError, match=r"wide: its pictures are 128 x 48 pixels"):
-        side_by_side([one, replace(one, width_px=128)], [folder, tmp_path / "wide"])
-    with pytest.raises(UsageError, match=r"plates: holds no results"):
-        side_by_side([one, replace(one, kind="plates")], [folder, tmp_path / "plates"])
-    later = replace(one, sequences=tuple(replace(s, numbers=tuple(n + 7 for n in s.numbers)) for s in one.sequences))
-    both = side_by_side([one, later], [tmp_path / "a" / "out", tmp_path / "b" / "out"])
-    assert {s.timeline for s in both.sequences} == {"rounds", "r2.rounds"}, "then by time"
-    assert both.name == "a/out | b/out"
 
 
 WITHOUT_WEBGL2 = """
