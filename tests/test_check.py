@@ -142,8 +142,8 @@ def test_more_frames_are_looked_at_before_a_strobe_is_said_to_be_missing(
         return find_timing(take, **others)
 
     monkeypatch.setattr("psvideo.runs.check.find_timing", only_in_many)
-    monkeypatch.setattr("psvideo.runs.check.LEAST_FRAMES", 1)
-    monkeypatch.setattr("psvideo.runs.check.ROUNDS", 2)
+    monkeypatch.setattr("psvideo.runs.steps.checked_frames.LEAST_FRAMES", 1)
+    monkeypatch.setattr("psvideo.runs.steps.checked_frames.ROUNDS", 2)
     assert run("check", shot("good"), "--json") == 0
     checked = json.loads(capsys.readouterr().out)
     assert len(asked) == 2

@@ -29,7 +29,7 @@ from psvideo.clip.record import Header
 from psvideo.clip.stated import Stated, relative_exposures
 from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.model.quantities import Aov
-from psvideo.runs.photographs.still_doubts import _signals
+from psvideo.runs.photographs.glance import _signals
 
 
 def test_a_dark_picture_is_taken_off_and_a_mask_is_used_where_they_are_named_so(tmp_path: Path) -> None:

@@ -14,12 +14,12 @@ from psvideo.model.irradiance.colours import (
     CHANNELS,
     MOST_COLOUR_CONDITION,
     colour_condition,
-    lamps_of,
     most_alike,
     unmixing_of,
 )
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.intensity import with_measured
+from psvideo.model.irradiance.lamps import lamps_of
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 

@@ -2,20 +2,18 @@
 
 import hashlib
 import re
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from psvideo.calibrate.light_files import find_stills
 from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
-from psvideo.calibrate.still_names import bears, meant_by
+from psvideo.calibrate.listed_names import all_found, pictures_meant, stem_of
+from psvideo.calibrate.still_names import bears
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
-from psvideo.formats.light_lists.picture_names import without_ending
 from psvideo.formats.paths import check_file
 from psvideo.model.units import listed
 
@@ -68,9 +66,9 @@ def pair_stills(
     _refuse_few(folder, files)
     masks = [file for file in found.left_aside if any(bears(file, name) for name in MASK_NAMES)]
     dark, mask = dark or (found.ambient[0] if found.ambient else None), mask or (masks[0] if masks else None)
-    matches = _matches(known, files) if named else []
+    matches = pictures_meant(known, files) if named else []
     places = tuple(range(len(known)))
-    if matches and (all(len(one) == 1 for one in matches) or _all_found(matches, files)):
+    if matches and (all(len(one) == 1 for one in matches) or all_found(matches, files)):
         places = tuple(place for place in places if matches[place])
         chosen = [matches[place][0] for place in places]
         lights = [known[place] for place in places]
@@ -143,22 +141,6 @@ def _refuse_named_twice(known: Sequence[str], chosen: Sequence[Path], whose: str
             )
 
 
-def _matches(names: Sequence[str], files: Sequence[Path]) -> list[list[Path]]:
-    """Return for every name of a list the files that it may mean: in the first way in which each means one, else in the
-    first in which every file is meant once, else what their whole names say."""
-    stems = [_stem_of(name) for name in names]
-    ways = (partial(_by_whole_name, stems=stems), _by_number, _by_beginning)
-    found = [[way(stem, files) for stem in stems] for way in ways]
-    exact = (one for one in found if all(len(each) == 1 for each in one))
-    fewer = (one for one in found if _all_found(one, files))
-    return next(exact, None) or next(fewer, found[0])
-
-
-def _all_found(matches: Sequence[Sequence[Path]], files: Sequence[Path]) -> bool:
-    """Return whether every picture is meant by one name, and no name means several: only lights are left over."""
-    return sorted(file for one in matches for file in one) == sorted(files) and all(len(one) < 2 for one in matches)
-
-
 def _left_over(known: Sequence[str], places: Sequence[int], whose: str) -> str:
     """Return a sentence on the lights of a list of which there is no picture, nothing where there is none."""
     without = [name for place, name in enumerate(known) if place not in places]
@@ -171,46 +153,10 @@ def _left_over(known: Sequence[str], places: Sequence[int], whose: str) -> str:
     )
 
 
-def _stem_of(name: str) -> str:
-    """Return a name of a list, a path perhaps, as the stem that its picture should have."""
-    return without_ending(re.split(r"[\\/]", name.strip())[-1])
-
-
-def _alike(stem: str) -> str:
-    """Return a stem in which letters that look the same are the same: a Mac writes accents as letters of their own."""
-    return unicodedata.normalize("NFC", stem).casefold()
-
-
-def _by_whole_name(stem: str, files: Sequence[Path], *, stems: Sequence[str]) -> list[Path]:
-    """Return the files of a name, or those whose name ends with it, as with a light's, and with no longer one of the
-    list's ``stems``."""
-    exact = [file for file in files if _alike(file.stem) == _alike(stem) or _alike(file.name) == _alike(stem)]
-    return exact or [file for file in files if bears(file, stem) and meant_by(file, stems) == stem]
-
-
-def _by_number(stem: str, files: Sequence[Path]) -> list[Path]:
-    """Return the files of a name where zeros before numbers do not count: ``img1`` and ``img01``."""
-    return [file for file in files if _unpadded(file.stem) == _unpadded(stem)]
-
-
-def _unpadded(stem: str) -> str:
-    return re.sub(r"(?<!\d)0+(?=\d)", "", _alike(stem))
-
-
-def _by_beginning(stem: str, files: Sequence[Path]) -> list[Path]:
-    """Return the files whose name goes on after the list's, or ends before it: what was exported gets a word more."""
-    mine = _alike(stem)
-    return [file for file in files if _goes_on(_alike(file.stem), mine) or _goes_on(mine, _alike(file.stem))]
-
-
-def _goes_on(longer: str, shorter: str) -> bool:
-    return longer.startswith(shorter) and not longer[len(shorter) :][:1].isalnum()
-
-
 def _refuse_other_order(folder: Path, names: Sequence[str], files: Sequence[Path], whose: str) -> None:
     """Raise PsvideoError where a list that names other files counts them in another order than the files': by order
     every picture would get another one's light."""
-    counted = [re.findall(r"\d+", _stem_of(name)) for name in names]
+    counted = [re.findall(r"\d+", stem_of(name)) for name in names]
     numbers = [int(one[-1]) for one in counted if one]
     if len(numbers) < len(names) or numbers == sorted(numbers) or not all(re.search(r"\d", one.stem) for one in files):
         return

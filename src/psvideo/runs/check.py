@@ -1,6 +1,5 @@
 """The check on the set: in seconds, from a few dozen frames, whether a take can be used. Nothing is written."""
 
-import math
 import tempfile
 import time
 from collections.abc import Sequence
@@ -8,9 +7,7 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from psvideo.clip import Clip, Kept, Take, keeping_near, read_frames
+from psvideo.clip import Clip, Kept, Take, keeping_near
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
@@ -19,13 +16,13 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS, Rig
-from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.model.timing import Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_accuracy import accuracy
-from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame_light, later_frames
+from psvideo.report.judge.of_frames import exposure_of_frames
 from psvideo.report.judge.of_rows import MOST_UNSEEN
 from psvideo.report.judge.of_validity import first_of_all, validity
 from psvideo.report.judge.typical_error import NOISY_DEG, moves
@@ -34,6 +31,15 @@ from psvideo.report.observe.observed import Observed
 from psvideo.runs.instants.reporting import observing
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
+from psvideo.runs.steps.checked_frames import (
+    frames_to_check,
+    later_light,
+    later_numbers,
+    light_of_frames,
+    more_frames,
+    too_short,
+    with_later_holes,
+)
 from psvideo.runs.steps.levels import levels_of
 from psvideo.runs.steps.saturation import saturation_of
 from psvideo.solve.instants import surfaces
@@ -41,15 +47,8 @@ from psvideo.solve.normals.solving import Solving
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_timing
 
-LEAST_FRAMES, MOST_FRAMES = 30, 160
-ROUNDS = 4
-"""This many rounds are looked at, where the clip is long enough."""
-WIDER = 2
-"""So many times as many where these show no strobe."""
-SPREAD = 6
-"""More frames, over the rest of the take: whether light and exposure stay."""
-EXPOSED_FRAMES, EARLY_FRAMES = 12, 16
-"""About this many frames show how a clip without a strobe is exposed, and what later frames are compared with."""
+EXPOSED_FRAMES = 12
+"""About this many frames show how a clip without a strobe is exposed."""
 MOST_KEPT_BYTES = 1_500_000_000
 """Larger windows are decoded twice: temporary folders may lie in memory."""
 
@@ -131,7 +130,7 @@ def judged_take(
     clip = whole.clip
     known = None if rig is None else read_rig(rig_of_take(rig, path), plan_lights=clip.plan.lights)
     window = frames_to_check(clip.plan, clip.numbers)
-    later = _later(clip, window)
+    later = later_numbers(clip, window)
     with _store(clip, window) as kept:
         take = replace(whole, numbers=window, kept=kept)
         try:
@@ -141,14 +140,14 @@ def judged_take(
                 raise
             lines: tuple[Judgement, ...] = (
                 _unseen(str(fault)),
-                saturation_of(take) or exposure_of_frames(_light_of(take, EXPOSED_FRAMES)),
+                saturation_of(take) or exposure_of_frames(light_of_frames(take, EXPOSED_FRAMES)),
             )
             judged, notes = "", tuple[str, ...]()
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
-            timing = _with_later_holes(timing, clip)
+            timing = with_later_holes(timing, clip)
             later = tuple(number for number in later if number > take.numbers[-1])
-            lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
+            lines = (*_lines_of(take, timing, known, watch=watch), *later_light(take, later))
             judged = clip.curve_doubt
             said = {one.sentence for one in (timing.swing, timing.half) if one}
             notes = tuple(note for note in timing.notes if note not in said)
@@ -170,10 +169,10 @@ def _timed(take: Take, first_light: str | None, watch: Watch) -> tuple[Take, Tim
     try:
         return take, find_timing(take, first_light=first_light, watch=watch)
     except NoStrobeError:
-        more = take.clip.numbers[: min(WIDER * len(take.numbers), MOST_FRAMES)]
-        if len(more) <= len(take.numbers):
+        more = more_frames(take)
+        if not more:
             raise
-        wider = replace(take, numbers=tuple(more))
+        wider = replace(take, numbers=more)
         with suppress(NoStrobeError):
             return wider, find_timing(wider, first_light=first_light, watch=watch)
         raise
@@ -244,29 +243,6 @@ def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | N
     return keeping_near(Path(tempfile.gettempdir()) / "psvideo-check")
 
 
-def frames_to_check(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
-    """Return the frames from a clip's start that show a few rounds, and a whole cycle with its marker."""
-    if plan.mode == "synced":
-        return tuple(numbers[: ROUNDS * len(plan.flashes)])
-    per_frame = plan.camera.frame_period_s
-    round_s = plan.cycle_s / len(plan.dark_rounds)
-    wanted = max(ROUNDS * round_s / per_frame, 1.3 * plan.marker_s / per_frame + 6)
-    return tuple(numbers[: min(max(math.ceil(wanted), LEAST_FRAMES), MOST_FRAMES)])
-
-
-def too_short(plan: Plan, numbers: Sequence[int]) -> bool:
-    """Return whether so few frames cannot be expected to show the strobe."""
-    return len(numbers) < 2 * len(plan.cycle_slots) / len(plan.dark_rounds) + 3
-
-
-def _later(clip: Clip, window: tuple[int, ...]) -> tuple[int, ...]:
-    """Return a few frames from the rest; none of a movie, which would have to be decoded on the way there."""
-    rest = clip.numbers[len(window) :]
-    if clip.is_movie or len(rest) < SPREAD:
-        return ()
-    return tuple(rest[round(place)] for place in np.linspace(0, len(rest) - 1, SPREAD))
-
-
 def _strobe_words(plan: Plan, timing: Timing) -> str:
     flashes = sum(not flash.is_dark for flash in timing.flashes)
     if plan.mode == "synced":
@@ -276,24 +252,3 @@ def _strobe_words(plan: Plan, timing: Timing) -> str:
 
 def _unseen(reason: str) -> Judgement:
     return Judgement(subject="strobe", grade="bad", found=reason)
-
-
-def _with_later_holes(timing: Timing, clip: Clip) -> Timing:
-    """Add the holes that the numbering shows after the frames that were looked at."""
-    known = {hole.after for hole in timing.dropped_frames}
-    more = [DroppedFrames(after=after, count=count) for after, count in clip.dropped if after not in known]
-    return replace(timing, dropped_frames=(*timing.dropped_frames, *more))
-
-
-def _light_of(take: Take, count: int) -> list[FrameLight]:
-    """Measure about this many of a take's frames, spread over them."""
-    numbers = take.numbers[:: max(len(take.numbers) // count, 1)]
-    return [frame_light(frame.image) for frame in read_frames(take.clip, numbers, kept=take.kept)]
-
-
-def _later_light(take: Take, later: tuple[int, ...]) -> tuple[Judgement, ...]:
-    """Judge frames from the rest of the take against those from its start; nothing where there are none."""
-    if not later:
-        return ()
-    late = [frame_light(frame.image) for frame in read_frames(take.clip, later, kept=take.kept)]
-    return (later_frames(_light_of(take, EARLY_FRAMES), late),)

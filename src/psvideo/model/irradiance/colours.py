@@ -1,7 +1,7 @@
-"""Flashes of several colours at once: which lights make up a lamp, and how a camera's channels tell them apart.
+"""Flashes of several colours at once, and how a camera's channels tell them apart.
 
 Channel c of flash k is ``sum_l mixing[k, l] * M[l, c] * albedo_c * max(0, n . l)``, with M the lights' spectra as the
-channels see them: intensity times colour. Lights that stand in one place are one lamp.
+channels see them: intensity times colour. Lights that stand in one place are one lamp (``lamps.py``).
 
 Where lamps change their colours between flashes, every channel has a matrix of its own, (flash, lamp), whose inverse
 gives each lamp's plate in that channel, whatever the surface's colour (De Decker et al., "Capturing multiple
@@ -12,21 +12,19 @@ ICCV 2007).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
 
 import numpy as np
 
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.intensity import lights_as_planned
+from psvideo.model.irradiance.lamps import lamp_names, lamp_places
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix
 from psvideo.model.rig import Light, Rig, Vector, intensities
 
 CHANNELS = 3
 MOST_COLOUR_CONDITION = 20.0
 """Colours that are told apart by less raise noise more than lights that nearly lie in one plane may."""
-ONE_PLACE_DEG, ONE_PLACE_M = 2.0, 0.03
-"""The LEDs of one lamp are a few millimetres apart, and each is measured to a degree or so."""
 WHITE: Vector = (1.0, 1.0, 1.0)
 
 
@@ -80,10 +78,10 @@ def unmixing_of(plan: Plan, rig: Rig, *, channels: int) -> Unmixing | None:
         return None
     _check_colours(chosen, channels)
     lights = lights_as_planned(rig, plan)
-    if len(_lamps(lights)) == len(lights) and all(len(plan.flashes[slot].lit) < 2 for slot in plan.lit_slots):
+    if len(lamp_places(lights)) == len(lights) and all(len(plan.flashes[slot].lit) < 2 for slot in plan.lit_slots):
         return None
     seen = mixing_matrix(plan)[:, :, None] * intensities(lights, CHANNELS)  # (slot, light, channel)
-    lamps = _lamps(lights)
+    lamps = lamp_places(lights)
     by_lamp = np.stack([seen[:, list(lamp)].sum(axis=1) for lamp in lamps], axis=1)
     condition = max(condition_of(by_lamp[..., channel]) for channel in range(CHANNELS))
     if condition <= MOST_COLOUR_CONDITION:
@@ -114,11 +112,6 @@ def most_alike(seen: Doubles) -> tuple[int, int]:
     return min(int(first), int(second)), max(int(first), int(second))
 
 
-def lamps_of(lights: Sequence[Light]) -> tuple[tuple[str, ...], ...]:
-    """Return the names of the lights of every lamp: those that stand in one place."""
-    return tuple(tuple(lights[place].name for place in lamp) for lamp in _lamps(lights))
-
-
 def _check_colours(lights: Sequence[Light], channels: int) -> None:
     plain = [light.name for light in lights if light.colour is None]
     if plain:
@@ -133,27 +126,8 @@ def _check_colours(lights: Sequence[Light], channels: int) -> None:
         )
 
 
-def _lamps(lights: Sequence[Light]) -> list[tuple[int, ...]]:
-    lamps: list[list[int]] = []
-    for place, light in enumerate(lights):
-        home = next((lamp for lamp in lamps if _in_one_place(lights[lamp[0]], light)), None)
-        if home is None:
-            lamps.append([place])
-        else:
-            home.append(place)
-    return [tuple(lamp) for lamp in lamps]
-
-
-def _in_one_place(one: Light, other: Light) -> bool:
-    if one.direction is not None and other.direction is not None:
-        return bool(np.dot(one.direction, other.direction) > np.cos(np.deg2rad(ONE_PLACE_DEG)))
-    if one.position_m is not None and other.position_m is not None:
-        return bool(np.linalg.norm(np.subtract(one.position_m, other.position_m)) < ONE_PLACE_M)
-    return False
-
-
 def _exchanged(plan: Plan, rig: Rig, lamps: Sequence[tuple[int, ...]], by_lamp: Doubles, condition: float) -> Unmixing:
-    names = _lamp_names(plan.lights, lamps)
+    names = lamp_names(plan.lights, lamps)
     home = {plan.lights[light]: name for lamp, name in zip(lamps, names, strict=True) for light in lamp}
     shares = np.stack([np.linalg.pinv(by_lamp[..., channel]) for channel in range(CHANNELS)], axis=-1)
     alone = [_one_flash(by_lamp[slot]) for slot in range(len(by_lamp))]
@@ -213,22 +187,6 @@ def _inseparable(plan: Plan, slot: int, seen: Doubles, between: float) -> Psvide
         f"(condition number {between:.3g}). Take LEDs of other colours (red, green and blue), flash fewer together, or "
         "measure them again with psvideo calibrate colours."
     )
-
-
-def _lamp_names(lights: Sequence[str], lamps: Sequence[tuple[int, ...]]) -> tuple[str, ...]:
-    """Return a name for every lamp: what its lights' names begin with (key of key_red and key_green), else all."""
-    names = []
-    for lamp in lamps:
-        own = [lights[place] for place in lamp]
-        stem = own[0] if len(own) == 1 else _common_start(own).rstrip("_-. ")
-        names.append(stem or "+".join(own))
-    if len(set(names)) < len(names):
-        return tuple("+".join(lights[place] for place in lamp) for lamp in lamps)
-    return tuple(names)
-
-
-def _common_start(names: Sequence[str]) -> str:
-    return "".join(letters[0] for letters in takewhile(lambda some: len(set(some)) == 1, zip(*names, strict=False)))
 
 
 def _renamed(flash: PlannedFlash, home: dict[str, str]) -> PlannedFlash:

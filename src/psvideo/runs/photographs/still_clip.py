@@ -19,8 +19,9 @@ from psvideo.formats.whole_files import write_text
 from psvideo.model.camera import Camera
 from psvideo.model.plan import PlannedFlash, assemble_plan
 from psvideo.model.rig import Rig
+from psvideo.runs.photographs.glance import glance_at
 from psvideo.runs.photographs.rti import write_rti
-from psvideo.runs.photographs.still_doubts import curve_doubt, dark_doubt, exposures_of, glance_at
+from psvideo.runs.photographs.still_doubts import curve_doubt, dark_doubt, exposures_of
 from psvideo.runs.photographs.still_rig import KnownLights, lens_stated
 from psvideo.solve.instants import Instant
 
