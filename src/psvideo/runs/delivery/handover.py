@@ -90,16 +90,7 @@ def write_note(
     """Write delivery.json; for a program how to load the delivery into it, in the caller's words, and what does that:
     a script for Nuke, an add-on for Blender."""
     clip = run.clip
-    made = Delivered(
-        clip=clip.name,
-        numbers=tuple(numbers),
-        fps=run.fps,
-        width_px=clip.width_px,
-        height_px=clip.height_px,
-        metric=metric,
-        delivery=delivery,
-        lights=lights_seen(rig, clip, delivery.space),
-    )
+    made = replace(_delivered(run, delivery, numbers, metric=metric), lights=lights_seen(rig, clip, delivery.space))
     write_text(run.folder / DELIVERY_FILE, delivery_text(made, rig))
     if delivery.program is not None:
         write_text(run.folder / note_name(delivery.program), caller.spell(loading_note(delivery.program, made)))
@@ -113,7 +104,14 @@ def write_note(
 def write_stage(run: Finished, delivery: Delivery, rig: Rig, instants: Mapping[int, float], *, metric: bool) -> None:
     """Write ``<clip>.usda``: camera, lights, card or mesh and material; ``instants`` are times (s) by number."""
     clip, numbers = run.clip, sorted(instants)
-    made = Delivered(
+    made = _delivered(run, delivery, numbers, metric=metric)
+    text = stage_text(made, numbers, _stage_view(rig, clip, delivery.space, instants))
+    write_text(run.folder / stage_name(clip.name), text)
+
+
+def _delivered(run: Finished, delivery: Delivery, numbers: Sequence[int], *, metric: bool) -> Delivered:
+    clip = run.clip
+    return Delivered(
         clip=clip.name,
         numbers=tuple(numbers),
         fps=run.fps,
@@ -122,8 +120,6 @@ def write_stage(run: Finished, delivery: Delivery, rig: Rig, instants: Mapping[i
         metric=metric,
         delivery=delivery,
     )
-    text = stage_text(made, numbers, _stage_view(rig, clip, delivery.space, instants))
-    write_text(run.folder / stage_name(clip.name), text)
 
 
 def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float]) -> StageView:
