@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import partial
-from math import inf
 from pathlib import Path
 
 from psvideo.clip import decoded_once
@@ -16,7 +15,6 @@ from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.whole_folders import unfinished_folder_of
 from psvideo.model.choices import (
-    MOST_ITERATIONS,
     PREVIEWS,
     USUAL_COMPRESSION,
     Align,
@@ -41,7 +39,7 @@ from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.piece_notes import noted_timing
 from psvideo.runs.instants.results import normals_run, piece_run
 from psvideo.runs.steps.caller import PYTHON, Caller, said_timing, say_kept, say_of_clip
-from psvideo.runs.steps.lighting import read_lighting
+from psvideo.runs.steps.lighting import AskedLighting, read_lighting
 from psvideo.runs.steps.output import Output, take_rate
 from psvideo.sync.open_take import open_take
 
@@ -186,7 +184,16 @@ def normals(
         preview_codec=preview_codec,
     )
     delivery = _delivery(asked, caller)
-    _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
+    known = AskedLighting(
+        mask=path_if_given("mask", mask),
+        flat=path_if_given("flat", flat),
+        near_iterations=near_iterations,
+        depth=path_if_given("depth", depth),
+        depth_scale=depth_scale,
+    )
+    known.check()
+    if not 1 <= denoise <= MOST_AVERAGED:
+        raise UsageError(f"`denoise` {denoise}: expected a number from 1 to {MOST_AVERAGED}.")
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
     rig_path = rig_of_take(rig_given, clip_path)
     if rig_given is None:
@@ -194,15 +201,7 @@ def normals(
     rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
-    lighting = read_lighting(
-        take,
-        rig_path,
-        path_if_given("mask", mask),
-        near_iterations=near_iterations,
-        depth_path=path_if_given("depth", depth),
-        metres_per_unit=depth_scale,
-        flat_path=path_if_given("flat", flat),
-    )
+    lighting = read_lighting(take, rig_path, known)
     over_time.check(take.plan, unmixed=lighting.unmixing is not None)
     lighting.check(delivery)
     delivery = metric_delivery(delivery, asked.aov, lighting, caller)
@@ -242,18 +241,3 @@ def _solved(job: Job, output: Output, piece: str | None, watch: Watch, caller: C
     done = normals_run(job, output, watch=watch)
     say_kept(job.take.kept, caller)
     return done.report
-
-
-def _check_numbers(
-    *, near_iterations: int | None, depth: Path | str | None, depth_scale: float | None, denoise: int
-) -> None:
-    if depth_scale is not None and depth is None:
-        raise UsageError("`depth_scale` is for the file given as `depth`: give that as well, or leave it out.")
-    if depth_scale is not None and not 0 < depth_scale < inf:
-        raise UsageError(
-            f"`depth_scale` {depth_scale:g}: expected metres per unit, above 0, of the file given as `depth`."
-        )
-    if near_iterations is not None and not 0 <= near_iterations <= MOST_ITERATIONS:
-        raise UsageError(f"`near_iterations` {near_iterations}: expected a number from 0 to {MOST_ITERATIONS}.")
-    if not 1 <= denoise <= MOST_AVERAGED:
-        raise UsageError(f"`denoise` {denoise}: expected a number from 1 to {MOST_AVERAGED}.")

@@ -26,7 +26,7 @@ from psvideo.runs.instants.results import normals_run
 from psvideo.runs.photographs.still_clip import still_clip, write_setup
 from psvideo.runs.photographs.still_rig import KnownLights, listed_lights, sphere_lights
 from psvideo.runs.steps.caller import PYTHON, Caller
-from psvideo.runs.steps.lighting import read_lighting
+from psvideo.runs.steps.lighting import AskedLighting, read_lighting
 from psvideo.runs.steps.output import Output
 
 STILL_HZ = Fraction(24)
@@ -136,7 +136,7 @@ def stills(
         take = Take(clip=opened.clip, numbers=opened.clip.numbers)
         for note in take.clip.notes:
             caller.say(note)
-        lighting = read_lighting(take, opened.rig_path, pairs.mask)
+        lighting = read_lighting(take, opened.rig_path, AskedLighting(mask=pairs.mask))
         lighting.check(delivery)
         delivery = metric_delivery(delivery, aov, lighting, caller)
         over_time = OverTime(aligning=Aligning(align="none"))

@@ -57,7 +57,7 @@ def parse_positive_seconds(text: str, *, option: str) -> float:
     return seconds
 
 
-def parse_speed_px_s(text: str, *, field_width_m: float | None, width_px: int | None, option: str = "--speed") -> float:
+def parse_speed_px_s(text: str, *, field_width_m: float | None, width_px: int | None) -> float:
     """Return a speed in pixels per second from ``800`` or ``800px/s``, or from ``0.5m/s`` and the field's width.
 
     >>> parse_speed_px_s("0.5 m/s", field_width_m=0.6, width_px=1920)
@@ -65,12 +65,12 @@ def parse_speed_px_s(text: str, *, field_width_m: float | None, width_px: int | 
     """
     found = re.fullmatch(rf"\s*({NUMBER})\s*(px/s|m/s)?\s*", text, re.IGNORECASE)
     if found is None or not 0 < float(found[1]) < math.inf:
-        raise UsageError(f"{option} {text!r} is not a speed above zero. Write pixels per second (800) or 0.5m/s.")
+        raise UsageError(f"--speed {text!r} is not a speed above zero. Write pixels per second (800) or 0.5m/s.")
     if (found[2] or "px/s").lower() == "px/s":
         return float(found[1])
     if field_width_m is None or width_px is None:
         raise UsageError(
-            f"{option} {text!r} is in metres per second, which needs the width of what the camera sees: add "
+            f"--speed {text!r} is in metres per second, which needs the width of what the camera sees: add "
             "--field-width, such as --field-width 0.6m, or give the speed in pixels per second."
         )
     return float(found[1]) / field_width_m * width_px
@@ -96,15 +96,15 @@ def parse_radius_mm(text: str) -> float:
     return float(found[1]) * {"m": 1000, "cm": 10, "mm": 1}.get((found[2] or "mm").lower(), 25.4)
 
 
-def parse_size_px(text: str, *, option: str = "--size") -> tuple[int, int]:
+def parse_size_px(text: str) -> tuple[int, int]:
     """Return (width, height) from ``1920x1080``."""
     found = re.fullmatch(r"\s*(\d{1,6})\s*[x×*]\s*(\d{1,6})\s*", text, re.IGNORECASE)
     if found is None or int(found[1]) == 0 or int(found[2]) == 0:
-        raise UsageError(f"{option} {text!r} is not a size. Write width x height in pixels, such as 1920x1080.")
+        raise UsageError(f"--size {text!r} is not a size. Write width x height in pixels, such as 1920x1080.")
     return int(found[1]), int(found[2])
 
 
-def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
+def parse_rate(text: str) -> Fraction:
     """Return a frame rate; the usual roundings of broadcast rates (23.98, 59.94, 119.88) become the exact ratio.
 
     >>> parse_rate("119.88"), parse_rate("120"), parse_rate("60000/1001")
@@ -113,7 +113,7 @@ def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
     try:
         return broadcast_fps(text.strip())
     except ValueError as fault:
-        raise UsageError(f"{option} {text!r} is not a frame rate: {fault}.") from None
+        raise UsageError(f"--fps {text!r} is not a frame rate: {fault}.") from None
 
 
 def parse_instants(text: str) -> str | Fraction:

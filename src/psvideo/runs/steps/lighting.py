@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 
 from psvideo.clip import DepthMaps, Masks, Take, open_depth, open_masks
@@ -10,7 +11,7 @@ from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.flat_toml import read_falloff
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.choices import NEAR_ITERATIONS
+from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS
 from psvideo.model.irradiance.colours import Unmixing, unmixing_of
 from psvideo.model.irradiance.falloff import Falloff
 from psvideo.model.irradiance.intensity import lights_as_planned
@@ -22,6 +23,32 @@ from psvideo.solve.normals.illumination import illumination
 
 UNSURE_DEG = 5.0
 """A rig whose own standard error is this large is named in the report; a guessed one says 20."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AskedLighting:
+    """What a caller names beside the rig: where to solve (``mask``), how light falls off over the picture (``flat``),
+    known ``depth`` and metres per unit of it (``depth_scale``), and how often near lights' surface is made again
+    (``near_iterations``; None: once, and never where depth is known)."""
+
+    mask: Path | None = None
+    flat: Path | None = None
+    near_iterations: int | None = None
+    depth: Path | None = None
+    depth_scale: float | None = None
+
+    def check(self) -> None:
+        """Raise UsageError where numbers cannot be meant, before anything is read."""
+        if self.depth_scale is not None and self.depth is None:
+            raise UsageError("`depth_scale` is for the file given as `depth`: give that as well, or leave it out.")
+        if self.depth_scale is not None and not 0 < self.depth_scale < inf:
+            raise UsageError(
+                f"`depth_scale` {self.depth_scale:g}: expected metres per unit, above 0, of the file given as `depth`."
+            )
+        if self.near_iterations is not None and not 0 <= self.near_iterations <= MOST_ITERATIONS:
+            raise UsageError(
+                f"`near_iterations` {self.near_iterations}: expected a number from 0 to {MOST_ITERATIONS}."
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,21 +126,9 @@ class Lighting:
         return None if self.masks is None else self.masks.sha256
 
 
-def read_lighting(
-    take: Take,
-    rig_path: Path,
-    mask_path: Path | None = None,
-    *,
-    near_iterations: int | None = None,
-    depth_path: Path | None = None,
-    metres_per_unit: float | None = None,
-    flat_path: Path | None = None,
-) -> Lighting:
-    """Read rig, mask and known depth of a take, a file or a folder with one per instant.
-
-    ``near_iterations`` is how often near lights' surface is made again; left out, once, and never where depth is known.
-    Raises PsvideoError where they do not fit the plan, or give no normals.
-    """
+def read_lighting(take: Take, rig_path: Path, asked: AskedLighting = AskedLighting()) -> Lighting:
+    """Read rig, mask and known depth of a take, a file or a folder with one per instant. Raises PsvideoError where they
+    do not fit the plan, or give no normals."""
     clip = take.clip
     flashed = read_rig(rig_path, plan_lights=clip.plan.lights)
     unmixing = unmixing_of(clip.plan, flashed, channels=clip.channels)
@@ -121,21 +136,21 @@ def read_lighting(
         check_separable(clip.plan)
     rig, plan = (flashed, clip.plan) if unmixing is None else (unmixing.rig, unmixing.shown)
     lights = lights_as_planned(rig, plan)
-    depths = None if depth_path is None else _read_depth(take, rig, depth_path, metres_per_unit)
-    iterations = near_iterations
+    depths = None if asked.depth is None else _read_depth(take, rig, asked.depth, asked.depth_scale)
+    iterations = asked.near_iterations
     if iterations is None:
         iterations = NEAR_ITERATIONS if depths is None else 0
     size = {"width_px": clip.width_px, "height_px": clip.height_px}
     with said_of(rig_path):
         near = near_surface_of(rig, lights, **size, iterations=iterations, depths=depths)
         lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
-    if near is None and near_iterations:
+    if near is None and asked.near_iterations:
         raise UsageError(
-            f"`near_iterations` {near_iterations}: nothing would use it. All lights of {rig_path} are distant, so that "
-            "normals do not depend on where the surface is; leave it out."
+            f"`near_iterations` {asked.near_iterations}: nothing would use it. All lights of {rig_path} are distant, "
+            "so that normals do not depend on where the surface is; leave it out."
         )
-    masks = None if mask_path is None else open_masks(mask_path, **size)
-    falloff = None if flat_path is None else _read_falloff(flat_path, take, lights)
+    masks = None if asked.mask is None else open_masks(asked.mask, **size)
+    falloff = None if asked.flat is None else _read_falloff(asked.flat, take, lights)
     return Lighting(
         rig_path=rig_path,
         rig=rig,

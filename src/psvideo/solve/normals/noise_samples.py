@@ -76,9 +76,7 @@ class NoiseSamples:
         return self.look_apart()
 
 
-def noise_samples(
-    plate: Samples | Mixture, number: int, black_level: float, scale: float, pixels: int, *, grey: bool = False
-) -> NoiseSamples | None:
+def noise_samples(plate: Samples | Mixture, number: int, pixels: int, *, grey: bool = False) -> NoiseSamples | None:
     """Return what about so many pixels of a plate show, None of one that is smaller than 3 x 3; ``grey``: of the mean
     of channels also beside.
 
@@ -97,8 +95,7 @@ def noise_samples(
     def lines(firsts: NDArray[np.intp], px: int) -> NDArray[np.floating]:
         """Return lines that lie ``px`` apart, three by three, (channel, 3, line, col)."""
         part = rows_of(plate, (firsts + px * np.arange(3)[:, None]).ravel())
-        if black_level or scale != 1 or part.dtype != np.float32:
-            part = (part - np.float32(black_level)) * np.float32(scale)
+        part = part.astype(np.result_type(part, np.float32), copy=False)
         return np.moveaxis(part.reshape(3, len(firsts), cols, *plate.shape[2:] or (1,)), -1, 0)
 
     def of_mean(channels: NDArray[np.floating], px: int, each: int) -> Differences:

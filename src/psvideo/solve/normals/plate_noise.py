@@ -60,13 +60,7 @@ class PlateNoise:
         return float(np.sqrt(self.read + self.photon * max(level, 0.0)))
 
 
-def noise_of(
-    plates: Sequence[Samples] | Sequence[Mixture],
-    lit: Illumination | None = None,
-    *,
-    black_level: float = 0.0,
-    scale: float = 1.0,
-) -> PlateNoise:
+def noise_of(plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination | None = None) -> PlateNoise:
     """Return the noise of plates as ``solve`` takes them, one per light: of one channel, so that its variance over the
     number of channels is that of their mean.
 
@@ -82,7 +76,7 @@ def noise_of(
     as well, and the lesser counts: paint, hair and the grain of a surface obey its lights, and noise does not.
     """
     pixels = SAMPLES // len(plates)
-    each = (noise_samples(plates[n], n, black_level, scale, pixels) for n in range(len(plates)))
+    each = (noise_samples(plates[n], n, pixels) for n in range(len(plates)))
     found = [one for one in each if one is not None]
     if sum(one.beside.detail.size for one in found) < LEAST_PIXELS:
         return PlateNoise(read=LEAST**2, photon=0.0)
@@ -103,7 +97,7 @@ def noise_of(
 def spread_of(plates: Sequence[Samples] | Sequence[Mixture]) -> float:
     """Return how many times as large as neighbours show it the noise of plates is under light, as a variance, in the
     mean of their channels; 1.0 where no dark shows it."""
-    found = [noise_samples(plates[n], n, 0.0, 1.0, SAMPLES // len(plates), grey=True) for n in range(len(plates))]
+    found = [noise_samples(plates[n], n, SAMPLES // len(plates), grey=True) for n in range(len(plates))]
     known = [one for one in found if one is not None]
     if sum(one.apart.detail.size for one in known) < LEAST_PIXELS:
         return 1.0

@@ -77,7 +77,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg)
 
 
-def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()) -> Surface:
+def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise) -> Surface:
     """Return the surface with errors that count what three lights cannot show, filled pixels included; what is trusted
     stays. Its errors' memory is taken over; under more lights they are as they were."""
     from psvideo.solve.normals.trust.judging_kernel import add_rows
@@ -86,7 +86,7 @@ def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: J
     if len(one.plates) > ALL_EXPLAINED or error is None:
         return surface
     measured = surface.valid if surface.source is None else surface.source == MEASURED
-    plain = replace(surface, valid=measured, error_deg=None, residual=None)
+    plain, how = replace(surface, valid=measured, error_deg=None, residual=None), Judging()
     points, signs = looked_at(plain, one, noise, how=how, by_slope=False)  # it is in the errors, and adds nothing here
     spread_deg = unchecked_deg(points.planes, one.lit.directions, beside_slope=not one.moved)
     unchecked = replace(signs, unchecked_deg=spread_deg, torn_share=np.ones_like(spread_deg))
