@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from psvideo.clip.linear import linear_light
 from psvideo.clip.record import CodedPicture, Header
-from psvideo.clip.transfer import CURVES, TransferCurve, disagreement, find_curve, to_light
+from psvideo.clip.tagged_curve import disagreement
+from psvideo.clip.transfer import CURVES, TransferCurve, find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 

@@ -11,6 +11,7 @@ from urllib.parse import quote
 import numpy as np
 import page_folder as small
 import pytest
+from watched_page import serving
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.page import page_server, show_of
@@ -24,12 +25,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
     (folder.parent / "secret.exr").write_bytes(b"nobody's")
     broken = folder / "normals" / "take_normals.1003.exr"
     broken.write_bytes(broken.read_bytes()[:900])
-    with page_server(show_of(folder), port=0) as one:
-        thread = threading.Thread(target=one.serve_forever)
-        thread.start()
+    with serving(folder) as one:
         yield one
-        one.shutdown()
-        thread.join()
 
 
 def ask(

@@ -7,8 +7,8 @@ colour of a mosaic.
 - records: ``record`` (a clip), ``take`` (a clip and the frames that are used)
 - finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves),
   ``stated_curve`` (by which curve they code light) and ``filters`` (whether they are a mosaic)
-- reading: ``reading``, ``transfer`` and ``linear`` (from codes to light), ``in_file`` and ``kept`` (codes that are not
-  in memory)
+- reading: ``reading``, ``transfer`` and ``linear`` (from codes to light), ``tagged_curve`` (whether files say that they
+  were coded otherwise), ``in_file`` and ``kept`` (codes that are not in memory)
 
 Rooms: ``decode`` (one module for each kind of file), ``streams`` (frames that come while they are recorded), ``maps``
 (masks and depth that others made of the footage).

@@ -11,7 +11,8 @@ from psvideo.clip.folder import MOVIES, RAWS, NumberedImages, find_sequence, unr
 from psvideo.clip.linear import depth_held, level_warning
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.stated import stated_by
-from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve, is_another_curve
+from psvideo.clip.tagged_curve import disagreement, is_another_curve
+from psvideo.clip.transfer import DISPLAYED, find_curve
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import FRAMES, find_plan, read_plan
 from psvideo.model.camera import Encoding

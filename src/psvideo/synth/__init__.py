@@ -5,7 +5,7 @@ It never uses the code that it tests: how a row integrates light is computed her
 ``shoot`` does it: begin there. It reads a ``scene`` of ``scene_tables`` (``scenes`` finds those that come with
 psvideo; ``other_cameras`` gives it as another of its cameras films it), makes plan, rig and clock of it (``shotplan``),
 sets it up from ``subject`` and ``lamps`` (``stage``), films it with ``camera``, and writes the ``truth`` beside the
-clip.
+clip, that of every flash (``flash_truth``) as it is rendered.
 """
 
 from psvideo.synth.camera.exposure import Exposure, expose
