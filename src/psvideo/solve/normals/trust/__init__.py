@@ -9,6 +9,6 @@ solved; its loop: ``indirect_kernel``), albedo that goes with the slope (``by_sl
 (``by_colour``), shadows that pass for light (``lit_shadows``), ``near_spread`` (near lights, whose directions depend on
 the distance), ``moving_doubt`` (plates that do not match after alignment), ``few_checked`` (by how much a model of the
 subject would turn normals under four and five lights), and ``unchecked`` (what three lights leave of real surfaces, and
-show hardly anywhere; and how well few lights check each other). ``doubting`` says how much they count; its loops are in
-``doubting_kernel``.
+show hardly anywhere; and how well few lights check each other). Loops of the signs are in ``signs_kernel``.
+``doubting`` says how much each counts, and makes one doubt of them; its loop is ``doubting_kernel``.
 """

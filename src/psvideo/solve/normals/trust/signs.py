@@ -147,7 +147,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
 def _beyond_noise(points: ThinSurface, wider: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the squares of what residuals predict beyond noise, those of noise, and the albedo where anything is
     known; ``wider`` is by how much noise grows with the lights that reach a point."""
-    from psvideo.solve.normals.trust.doubting_kernel import fill_squares
+    from psvideo.solve.normals.trust.signs_kernel import fill_squares
 
     squares, noise, shown = np.empty((3, *points.known.shape), np.float32)
     plain = points.surface.error_deg is None
@@ -162,7 +162,7 @@ def _beyond_noise(points: ThinSurface, wider: Floats) -> tuple[Floats, Floats, F
 def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
     """Return the square of what residuals predict, as far as it changes from sample to sample beyond noise: a root of
     ``free`` squares of independent numbers varies so much about its mean."""
-    from psvideo.solve.normals.trust.doubting_kernel import fill_changes
+    from psvideo.solve.normals.trust.signs_kernel import fill_changes
 
     mean = np.sqrt(2 / free) * math.gamma((free + 1) / 2) / math.gamma(free / 2)
     changes, apart = np.empty_like(noise), max(UNEVEN_PX // points.step, 1)
@@ -205,7 +205,7 @@ def hidden_by(lights: int) -> float:
 def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
     """Return by how many degrees light from around turns the normals. Least squares takes light that every lamp adds
     alike for a vector, of which what lies across the normal turns it."""
-    from psvideo.solve.normals.trust.doubting_kernel import fill_indirect_deg
+    from psvideo.solve.normals.trust.signs_kernel import fill_indirect_deg
 
     both = np.stack(seen[:2])
     near, far = (blurred(both, width).reshape(2, -1) for width in points.widths)

@@ -42,7 +42,7 @@ class Surroundings:
     @classmethod
     def both(cls, points: ThinSurface, noise: Floats, albedo: Floats, one: Evidence) -> "list[Surroundings]":
         """Look around the points, near and far; ``albedo``, zeros where nothing is known, becomes ``shown``."""
-        from psvideo.solve.normals.trust.doubting_kernel import fill_levels, fill_weighed
+        from psvideo.solve.normals.trust.signs_kernel import fill_levels, fill_weighed
 
         if one.indirect is None:
             raise ValueError("`indirect` expected in the evidence: see indirect.py")
@@ -76,7 +76,7 @@ class Surroundings:
     def typical(self, squares: Floats) -> Floats:
         """Return the typical ``squares``, of which the caller has taken off the mean that noise makes, times the
         weight. Outliers count as OUTLYING times what is typical."""
-        from psvideo.solve.normals.trust.doubting_kernel import fill_limited
+        from psvideo.solve.normals.trust.signs_kernel import fill_limited
 
         limited = squares * self.shown
         means = blurred(limited, self.width)
@@ -92,7 +92,7 @@ def roots(squares: Floats, surroundings: list[Surroundings]) -> tuple[Floats, Fl
     """Return the root of what is typical near or far, whichever is more: what is more than chance, and what is likely,
     with the margin back that was taken off for noise."""
 
-    from psvideo.solve.normals.trust.doubting_kernel import raise_to_roots
+    from psvideo.solve.normals.trust.signs_kernel import raise_to_roots
 
     surely, likely = np.zeros((2, *squares.shape), np.float32)
     for each in surroundings:

@@ -23,7 +23,7 @@ def torn_angles_deg(
     """Return the angle by which the normals around every point surely cannot be one surface's, and likely: around any
     four points the slopes of a surface add up to 0, and what these add up to is averaged over a square. Through a lens,
     whose ``view`` it is of a picture of this ``shape``, it is the slopes of the logarithm of depth that do."""
-    from psvideo.solve.normals.trust.doubting_kernel import fill_torn, fill_torn_deg, square_torn
+    from psvideo.solve.normals.trust.signs_kernel import fill_torn, fill_torn_deg, square_torn
 
     torn = np.empty((2, *points.known.shape), np.float32)
     fill_torn(_along_rays(points, view, shape), points.known_bytes, float(LEAST_FACING), float(MOST_TORN), torn)
