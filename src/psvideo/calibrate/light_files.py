@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
-from psvideo.calibrate.still_names import sorted_by_name
+from psvideo.calibrate.picture_sets import LightFiles
+from psvideo.calibrate.still_names import AMBIENT_NAMES, ROOM_NAMES, sorted_by_name
 from psvideo.clip.folder import KINDS, USUAL_KINDS, number_of, unread_in
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name

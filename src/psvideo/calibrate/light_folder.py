@@ -12,8 +12,8 @@ from psvideo.calibrate.light_files import (
     folders_with_pictures,
     pictures_in,
 )
-from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
-from psvideo.calibrate.still_names import sorted_by_name
+from psvideo.calibrate.picture_sets import LightFiles
+from psvideo.calibrate.still_names import AMBIENT_NAMES, ROOM_NAMES, sorted_by_name
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import FRAMES
 from psvideo.model.units import listed

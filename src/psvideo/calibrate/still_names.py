@@ -5,7 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import AMBIENT_NAMES, MASK_NAMES, ROOM_NAMES
+AMBIENT_NAMES = ("ambient", "dark")
+"""A picture or a folder of this name shows the scene with every light off; it is taken off the others."""
+ROOM_NAMES = ("room", "outline", "ref")
+"""A picture of this name shows the scene with the room light on: on it outlines show best."""
+MASK_NAMES = ("mask", "Mask", "MASK")
+"""A picture whose name is or ends with such a word says where the subject is; it shows no light."""
 
 
 def bears(file: Path, light: str) -> bool:

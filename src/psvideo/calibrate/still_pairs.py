@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from psvideo.calibrate.light_files import find_stills
-from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
 from psvideo.calibrate.listed_names import all_found, pictures_meant, stem_of
-from psvideo.calibrate.still_names import bears
+from psvideo.calibrate.picture_sets import LightFiles
+from psvideo.calibrate.still_names import MASK_NAMES, bears
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.errors import PsvideoError

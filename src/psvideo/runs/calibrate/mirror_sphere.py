@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import read_picture
 from psvideo.calibrate.mirror.lights import calibrate_lights, check_enough
 from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
+from psvideo.calibrate.picture_sets import read_picture
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError, check_within

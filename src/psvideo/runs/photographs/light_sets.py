@@ -14,14 +14,8 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.light_files import find_stills
 from psvideo.calibrate.light_folder import find_light_pictures, shows_lights
-from psvideo.calibrate.light_pictures import (
-    LightFiles,
-    LightPictures,
-    mean_of_sets,
-    pictures_of_round,
-    read_picture,
-    read_sets,
-)
+from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets, pictures_of_round
+from psvideo.calibrate.picture_sets import LightFiles, read_picture, read_sets
 from psvideo.calibrate.still_places import Place
 from psvideo.clip import Take
 from psvideo.clip.folder import MOVIES

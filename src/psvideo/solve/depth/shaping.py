@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from psvideo.model.rig import Rig, check_rig
 from psvideo.model.surface import Surface, check_surface
+from psvideo.solve.depth.anchors import Plane
 from psvideo.solve.depth.cao2022 import BILATERAL, Before, Height, Integration, integrate
-from psvideo.solve.depth.scale import Depth, Plane, depth_of_height
+from psvideo.solve.depth.scale import Depth, depth_of_height
 from psvideo.solve.depth.view import View, view_of
 
 
