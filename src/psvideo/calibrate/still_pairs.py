@@ -3,7 +3,7 @@
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psvideo.calibrate.light_files import find_stills
@@ -66,31 +66,41 @@ def pair_stills(
     _refuse_few(folder, files)
     masks = [file for file in found.left_aside if any(bears(file, name) for name in MASK_NAMES)]
     dark, mask = dark or (found.ambient[0] if found.ambient else None), mask or (masks[0] if masks else None)
-    matches = pictures_meant(known, files) if named else []
-    places = tuple(range(len(known)))
-    if matches and (all(len(one) == 1 for one in matches) or all_found(matches, files)):
-        places = tuple(place for place in places if matches[place])
-        chosen = [matches[place][0] for place in places]
-        lights = [known[place] for place in places]
-        _refuse_named_twice(lights, chosen, whose)
-        how = (
-            f"Pictures belong to lights by name ({whose}): {_shown(lights, chosen)}.{_left_over(known, places, whose)}"
-        )
-    elif any(matches):
-        raise PsvideoError(_misnamed(folder, known, matches, files, whose))
-    else:
+    chosen = _by_name(folder, known, files, whose) if named else None
+    if chosen is None:
         if named:
             _refuse_other_order(folder, known, files, whose)
-        chosen = _in_order(folder, files, known, found, whose)
-        how = (
-            f"Pictures belong to lights by order, since {whose} names none of them: {_shown(known, chosen)}. Where "
-            "that is wrong, the rig will not fit."
-        )
-    used = {*chosen, *masks, dark, mask}
+        chosen = _by_order(folder, known, files, found, whose)
+    used = {*chosen.files, *masks, dark, mask}
     others = (*files, *found.left_aside, *found.ambient, *([found.room] if found.room else []))
-    aside = [file for file in others if file not in used and file.resolve() not in apart]
-    names = tuple(known[place] for place in places) if keep_names else _own_names(chosen)
-    return Pairs(files=tuple(chosen), names=names, places=places, how=how, dark=dark, mask=mask, aside=tuple(aside))
+    aside = tuple(file for file in others if file not in used and file.resolve() not in apart)
+    names = chosen.names if keep_names else _own_names(chosen.files)
+    return replace(chosen, names=names, dark=dark, mask=mask, aside=aside)
+
+
+def _by_name(folder: Path, known: Sequence[str], files: Sequence[Path], whose: str) -> Pairs | None:
+    """Return the pairs that names make, None where no name means any picture. Raises PsvideoError where some do, and
+    others mean none or several."""
+    matches = pictures_meant(known, files)
+    if not any(matches):
+        return None
+    if not (all(len(one) == 1 for one in matches) or all_found(matches, files)):
+        raise PsvideoError(_misnamed(folder, known, matches, files, whose))
+    places = tuple(place for place, one in enumerate(matches) if one)
+    chosen, lights = [matches[place][0] for place in places], tuple(known[place] for place in places)
+    _refuse_named_twice(lights, chosen, whose)
+    how = f"Pictures belong to lights by name ({whose}): {_shown(lights, chosen)}.{_left_over(known, places, whose)}"
+    return Pairs(files=tuple(chosen), names=lights, places=places, how=how)
+
+
+def _by_order(folder: Path, known: Sequence[str], files: Sequence[Path], found: LightFiles, whose: str) -> Pairs:
+    """Return every light with the picture in its place. Raises PsvideoError where there are not as many."""
+    _refuse_other_count(folder, files, known, found, whose)
+    how = (
+        f"Pictures belong to lights by order, since {whose} names none of them: {_shown(known, files)}. Where "
+        "that is wrong, the rig will not fit."
+    )
+    return Pairs(files=tuple(files), names=tuple(known), places=tuple(range(len(known))), how=how)
 
 
 def _refuse_other_than_pictures(*given: Path | None) -> None:
@@ -167,9 +177,12 @@ def _refuse_other_order(folder: Path, names: Sequence[str], files: Sequence[Path
     )
 
 
-def _in_order(folder: Path, files: Sequence[Path], known: Sequence[str], found: LightFiles, whose: str) -> list[Path]:
+def _refuse_other_count(
+    folder: Path, files: Sequence[Path], known: Sequence[str], found: LightFiles, whose: str
+) -> None:
+    """Raise PsvideoError where there are more or fewer pictures than lights."""
     if len(files) == len(known):
-        return list(files)
+        return
     aside = f" ({', '.join(file.name for file in found.left_aside[:3])} left aside)" if found.left_aside else ""
     raise PsvideoError(
         f"{folder}: holds {len(files)} pictures of lights, {files[0].name} to {files[-1].name}{aside}, and {whose} "
