@@ -17,7 +17,7 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig
 from psvideo.model.irradiance.colours import WHITE, Unmixing, unmixing_of
-from psvideo.model.irradiance.lamps import lamps_of
+from psvideo.model.irradiance.led_lamps import lamps_of
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.plates.light_plate import LightPlate

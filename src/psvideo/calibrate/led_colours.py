@@ -19,7 +19,7 @@ from psvideo.model.irradiance.colours import (
 )
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.irradiance.intensity import with_measured
-from psvideo.model.irradiance.lamps import lamps_of
+from psvideo.model.irradiance.led_lamps import lamps_of
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 

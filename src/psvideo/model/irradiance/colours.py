@@ -1,7 +1,7 @@
 """Flashes of several colours at once, and how a camera's channels tell them apart.
 
 Channel c of flash k is ``sum_l mixing[k, l] * M[l, c] * albedo_c * max(0, n . l)``, with M the lights' spectra as the
-channels see them: intensity times colour. Lights that stand in one place are one lamp (``lamps.py``).
+channels see them: intensity times colour. Lights that stand in one place are one lamp (``led_lamps.py``).
 
 Where lamps change their colours between flashes, every channel has a matrix of its own, (flash, lamp), whose inverse
 gives each lamp's plate in that channel, whatever the surface's colour (De Decker et al., "Capturing multiple
@@ -18,7 +18,7 @@ import numpy as np
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.intensity import lights_as_planned
-from psvideo.model.irradiance.lamps import lamp_names, lamp_places
+from psvideo.model.irradiance.led_lamps import lamp_names, lamp_places
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix
 from psvideo.model.rig import Light, Rig, Vector, intensities
 
