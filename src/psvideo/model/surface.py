@@ -90,6 +90,8 @@ class Surface:
     slope_deg
         By how many degrees a typical normal is turned as albedo that goes with the slope shows it, which paint does
         not: a sheen, haze, a lamp of another strength. 0 where nobody looked for it.
+    shadows_lit
+        Whether light from other surfaces is seen in the subject's shadows, 0 to 1; 0 where nobody looked for it.
 
     Notes
     -----
@@ -105,6 +107,7 @@ class Surface:
     misfit: Misfit | None = None
     source: NDArray[np.uint8] | None = None
     slope_deg: float = 0.0
+    shadows_lit: float = 0.0
 
     @property
     def shown(self) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from psvideo.model.arrays import Bytes, Floats, Mask
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.bucket_queue import queue_for
 from psvideo.solve.filling.growing import grow
-from psvideo.solve.filling.looking import Said, look_rows, mark_lit_rows, said_for
+from psvideo.solve.filling.looking import KEPT, MOST_COUNTED, Said, look_rows, mark_lit_rows, said_for
 from psvideo.solve.filling.neighbours import REACH_PX
 from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
@@ -22,10 +22,10 @@ MOST_LIGHTS_AROUND = 5
 """A lit pixel belongs to the subject where this many of the nine around it are lit or solved; noise does not."""
 LARGEST_HOLE = 0.005
 """What no light reaches belongs to the subject where that encloses it and it is no larger share of the picture."""
-AT_SEAM_DEG = np.array([28, 19, 2], np.float32)
+AT_SEAM_DEG = np.array([28, 19, 2, 2], np.float32)
 TIMES_AROUND, PER_ROOT_DEG, MOST_ERROR_DEG = np.float32(1.5), np.float32(45), np.float32(60)
-"""How far two thirds of the filled pixels are off at most: the sum of AT_SEAM_DEG (for no, one and two lights), of
-TIMES_AROUND times the error of what was measured around, since what spoils three lights spoils fewer more, and of
+"""How far two thirds of the filled pixels are off at most: the sum of AT_SEAM_DEG (for no, one, two and three lights),
+of TIMES_AROUND times the error of what was measured around, since what spoils three lights spoils fewer more, and of
 PER_ROOT_DEG times the root of the distance from solved pixels over the longer side of the picture. Measured under sets
 of 3 to 12 lights on a bear, a cat and a ball (DiLiGenT), another renderer's bunny, and virtual shapes of seven
 materials that light each other. (With the error that is typical of the whole picture instead, claims of one set beside
@@ -36,23 +36,32 @@ point."""
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
 
 
-def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float) -> Surface:
+def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, without: Bytes | None = None) -> Surface:
     """Return the surface with a normal and an albedo in every pixel of the subject; its memory is taken over.
 
     solved: (row, col), where the surface has a normal, trusted or not.
     noise: the standard deviation of a dark sample, in units of saturation.
+    without: (row, col), which lights are left out of a solved pixel, which is estimated from the others (see
+        ``leaving_out``).
 
     The subject is what the mask allows; without one, what any light reaches, and small holes in it. What was solved
-    stays to the bit. ``source`` says of every pixel how many lights its normal is from.
+    with all lights stays to the bit. ``source`` says of every pixel how many lights its normal is from.
     """
     wanted = _wanted(solved, one)
+    if without is not None:
+        solved = solved & (without == 0)
+        wanted |= without > 0
+        if surface.error_deg is not None:
+            surface.error_deg[wanted] = 0  # of a normal that is not kept
     where = _places(wanted)
     if not len(where):
         return replace(surface, source=_source(solved))
-    said = _said(one, wanted, len(where), noise)
+    asked = wanted.view(np.uint8) if without is None else wanted | without
+    said = said_for(len(where), noise, kept=MOST_COUNTED if without is None else KEPT)
+    _look(one, asked, said)
     normals, albedo = _bits(np.moveaxis(surface.normals, -1, 0)), _bits(_channels(surface.albedo))
     tiles = tiles_around(wanted, solved, normals, albedo, reach_px=REACH_PX, spare=one.spare)
-    del wanted
+    del wanted, asked
     away = np.zeros(len(where), np.float32)
     grow(tiles, said, where, queue_for(len(where)), away)
     del said
@@ -140,16 +149,14 @@ def holes_in(subject: Mask) -> Mask:
     return np.asarray(small[labels]) if count > 1 else np.zeros_like(subject)
 
 
-def _said(one: Evidence, wanted: Mask, pixels: int, noise: float) -> Said:
-    said = said_for(pixels, noise)
-    asked, counts = wanted.view(np.uint8), np.count_nonzero(wanted, axis=1)
+def _look(one: Evidence, asked: Bytes, said: Said) -> None:
+    counts = np.count_nonzero(asked, axis=1)
     begins = np.cumsum(counts) - counts
 
     def look(given: Task, work: Work, first: int, last: int) -> None:
         look_rows(given, work, asked, begins, said, first, last)
 
     one.in_bands(look, None, needed=counts > 0)
-    return said
 
 
 def _channels(albedo: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -13,7 +13,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, lent
 from psvideo.model.arrays import Floats
 from psvideo.solve.filling.bucket_queue import BUCKETS, FOREVER, NONE, Queue, push, take_out
-from psvideo.solve.filling.hernandez2011 import from_one, from_two
+from psvideo.solve.filling.hernandez2011 import from_one, from_three, from_two
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours, known_of, misfit
 from psvideo.solve.filling.tiles import AT_RIM, ODD_AT_RIM, THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
@@ -151,7 +151,9 @@ def _estimate(p: Tiles, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
     nx, ny, nz, albedo, reds, blues = from_neighbours(p, s, row, col)
     count = s.reached[pixel]
-    if count == 2:
+    if count == THREE_LIGHTS:
+        nx, ny, nz, albedo = from_three(s, pixel, nx, ny, nz, albedo)
+    elif count == 2:
         nx, ny, nz, albedo = from_two(s, pixel, nx, ny, nz, albedo)
     elif count == 1:
         nx, ny, nz, albedo = from_one(s, pixel, nx, ny, nz, albedo)

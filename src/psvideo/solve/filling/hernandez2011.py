@@ -21,6 +21,7 @@ LOG_COSINES = np.log(COSINES)
 HALF, TWO = np.float32(0.5), np.float32(2)
 TINY, FAR = np.float32(1e-6), np.float32(1e30)
 TURN = np.float32(2 * np.pi)
+LEAST_VOLUME = np.float32(0.05)  # of three unit vectors to lights
 LEAST_COSINE, LEAST_SINE_SQUARED = np.float32(0.05), np.float32(1e-3)
 
 
@@ -67,6 +68,32 @@ def from_two(
     if albedo > ZERO:
         found = min(max(found, albedo * (ONE - TWO * ALBEDO_SHARE)), albedo * (ONE + TWO * ALBEDO_SHARE))
     return gx * c + dx * d, gy * c + dy * d, gz * c + dz * d, found
+
+
+@FUSED.inlined
+def from_three(
+    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """The normal and albedo that three lights give, where a fourth is left out; where these stand nearly in a plane, or
+    give what faces away from the camera, that of the two brightest and the neighbours."""
+    first, second, third = s.bright[pixel, 0], s.bright[pixel, 1], s.bright[pixel, 2]
+    ax, ay, az = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2]
+    bx, by, bz = s.towards[pixel, 1, 0], s.towards[pixel, 1, 1], s.towards[pixel, 1, 2]
+    cx, cy, cz = s.towards[pixel, 2, 0], s.towards[pixel, 2, 1], s.towards[pixel, 2, 2]
+    ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    volume = ax * ux + ay * uy + az * uz
+    if abs(volume) < LEAST_VOLUME:
+        return from_two(s, pixel, nx, ny, nz, albedo)
+    one = ONE / volume
+    vx, vy, vz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+    wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    gx, gy = (first * ux + second * vx + third * wx) * one, (first * uy + second * vy + third * wy) * one
+    gz = (first * uz + second * vz + third * wz) * one
+    if not gz > ZERO:
+        return from_two(s, pixel, nx, ny, nz, albedo)
+    length = np.sqrt(gx * gx + gy * gy + gz * gz)
+    one = ONE / length
+    return gx * one, gy * one, gz * one, length
 
 
 @FUSED.inlined

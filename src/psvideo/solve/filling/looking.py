@@ -1,4 +1,4 @@
-"""The compiled loop that reads what the lights say in pixels without a solution: the two brightest, and the colour."""
+"""The compiled loop that reads what the lights say in pixels without a solution: the brightest, and the colour."""
 
 from typing import NamedTuple
 
@@ -13,16 +13,17 @@ from psvideo.solve.normals.loops.measuring import any_asked, is_clipped, is_seen
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
 from psvideo.solve.normals.task import Task, Work
 
-MOST_COUNTED = 2
-"""Lights that a filled normal is made from."""
+MOST_COUNTED, KEPT = 2, 3
+"""Lights that a filled normal is made from, and those that one is from which was solved with more."""
 
 
 class Said(NamedTuple):
     """What the lights say of every pixel that is to be filled (pixel, ...), in units of albedo.
 
-    reached: how many lights reach it, counted up to two. bright: what the brightest and the next one show, 0 where
-    there is none. towards: (pixel, 2, 3), the unit directions to those two. colour: (pixel, 3), the sum over the lights
-    that reach it, alike in all three where the picture is grey. noise: of a colour's sum, as a standard deviation.
+    reached: how many lights reach it, counted up to two, and up to three where any is left out. bright: (pixel, 3),
+    what the brightest show, 0 where there is none. towards: (pixel, 3, 3), the unit directions to those. (Two of each
+    where no light is left out anywhere.) colour: (pixel, 3), the sum over the lights that reach it, alike in all three
+    where the picture is grey. noise: of a colour's sum, as a standard deviation.
     """
 
     reached: Bytes
@@ -32,12 +33,12 @@ class Said(NamedTuple):
     noise: np.float32
 
 
-def said_for(pixels: int, noise: float) -> Said:
-    """Return memory for what lights say of this many pixels."""
+def said_for(pixels: int, noise: float, *, kept: int) -> Said:
+    """Return memory for what so many lights say of this many pixels."""
     return Said(
         reached=np.zeros(pixels, np.uint8),
-        bright=np.zeros((pixels, 2), np.float32),
-        towards=np.zeros((pixels, 2, 3), np.float32),
+        bright=np.zeros((pixels, kept), np.float32),
+        towards=np.zeros((pixels, kept, 3), np.float32),
         colour=np.zeros((pixels, 3), np.float32),
         noise=np.float32(noise),
     )
@@ -74,12 +75,12 @@ def mark_lit_rows(task: Task, work: Work, wanted: Bytes, lit: Bytes, first: int,
 def look_rows(
     task: Task, work: Work, wanted: Bytes, begins: NDArray[np.int64], said: Said, first: int, last: int
 ) -> None:
-    """Read the rows' pixels that are ``wanted`` (row, col); those of a row lie in ``said`` one after another from its
-    place in ``begins`` (row,) on."""
+    """Read the rows' pixels that are ``wanted`` (row, col): 1, and 2 to the power of a light's number and one for each
+    that is left out; those of a row lie in ``said`` one after another from its place in ``begins`` (row,) on."""
     t = lent_task(task, work.matrix, work.per_strength)
     asked, values, places = lent(wanted), lent(work.values), lent(begins)
     count, bright, towards, colour = lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour)
-    channels = t.tone.shape[1]
+    channels, kept = t.tone.shape[1], bright.shape[1]
     scale, share = t.albedo_scale, ONE / np.float32(channels)
     for row in range(first, last):
         begin = places[row]
@@ -96,7 +97,7 @@ def look_rows(
                     if not asked[row, col + i]:
                         continue
                     place += 1
-                    if not values[light * channels, i] > ABSENT:
+                    if asked[row, col + i] & (2 << light) or not values[light * channels, i] > ABSENT:
                         continue
                     level, shows = ZERO, ZERO
                     for channel in range(channels):
@@ -106,25 +107,27 @@ def look_rows(
                         continue
                     one = at(per, i)
                     level *= one * scale
-                    if count[place] < MOST_COUNTED:
+                    if count[place] < (KEPT if asked[row, col + i] > 1 else MOST_COUNTED):
                         count[place] += 1
                     for channel in range(3):
                         source = min(channel, channels - 1)
                         colour[place, channel] += max(values[light * channels + source, i], ZERO)
                     x, y, z = at(lamp, i)
-                    if level > bright[place, 0]:
-                        _move_second(bright, towards, place)
-                        _note(bright, towards, place, 0, level, x * one, y * one, z * one)
-                    elif level > bright[place, 1]:
-                        _note(bright, towards, place, 1, level, x * one, y * one, z * one)
+                    rank = kept
+                    while rank > 0 and level > bright[place, rank - 1]:
+                        rank -= 1
+                    if rank < kept:
+                        _make_room(bright, towards, place, rank)
+                        _note(bright, towards, place, rank, level, x * one, y * one, z * one)
             begin = place + 1
 
 
 @FUSED.inlined
-def _move_second(bright: Floats, towards: Floats, place: int) -> None:
-    bright[place, 1] = bright[place, 0]
-    for axis in range(3):
-        towards[place, 1, axis] = towards[place, 0, axis]
+def _make_room(bright: Floats, towards: Floats, place: int, rank: int) -> None:
+    for later in range(bright.shape[1] - 1, rank, -1):
+        bright[place, later] = bright[place, later - 1]
+        for axis in range(3):
+            towards[place, later, axis] = towards[place, later - 1, axis]
 
 
 @FUSED.inlined

@@ -77,9 +77,11 @@ class Solving:
         """Return the surface that explains one plate per light; see the solvers for the arguments, and ``Evidence`` for
         what is unsure of the plates and ``moves``."""
         from psvideo.solve.filling.filled import filled
+        from psvideo.solve.filling.leaving_out import left_out
 
         solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves)
         known = judged(solved, one, noise)
+        without = left_out(known, one, solved=solved.valid) if self.fill else None
         known = replace(
             known,
             residual=known.residual if self.residual else None,
@@ -87,7 +89,7 @@ class Solving:
         )
         valid = solved.valid
         del solved  # residuals that nobody asked for are gone with it
-        whole = filled(known, one, solved=valid, noise=noise.dark) if self.fill else emptied(known)
+        whole = filled(known, one, solved=valid, noise=noise.dark, without=without) if self.fill else emptied(known)
         return with_unchecked(whole, one, noise)
 
     def look(

@@ -74,7 +74,9 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
     by_slope_deg = np.broadcast_to(np.float32(signs.by_slope_deg), points.known.shape)
     slope_deg = _usual(by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
-    return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg)
+    return replace(
+        surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg, shadows_lit=signs.shadows_lit
+    )
 
 
 def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise) -> Surface:

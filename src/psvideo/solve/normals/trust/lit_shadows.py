@@ -4,6 +4,8 @@ Such normals keep one angle to that lamp, whichever way the surface turns on int
 contradicts them. A surface that the lamp does graze turns away from it as much as it turns at all.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from psvideo.compute.ranks import median
@@ -33,19 +35,27 @@ OFF_DEG = 10.0
 were trusted 28 to 44 % were over 10."""
 
 
-def shadows_deg(points: ThinSurface, lit: Illumination, known: Mask) -> Floats:
-    """Return by how many degrees normals may be off because a shadow passes for light, (row, col) of the points, of
-    which these ``known`` speak for the subject; zeros where its shadows are black, or too few points show."""
+class LitShadows(NamedTuple):
+    """By how many degrees normals may be off because a shadow passes for light, (row, col) of the points; and whether
+    the subject's shadows are lit, 0 to 1. Zeros where they are black, or too few points show."""
+
+    off_deg: Floats
+    lit: float
+
+
+def shadows_of(points: ThinSurface, lit: Illumination, known: Mask) -> LitShadows:
+    """Return what shadows that are lit from around make of normals; the points that are ``known`` speak for the
+    subject."""
     ways = towards(points, lit)
     cosines = (ways * points.planes).sum(axis=1)
     least, next_least = np.partition(cosines, 1, axis=0)[:2]
     keeps = _angle_beside_turn(points.planes, _of_lamp(ways, cosines.argmin(axis=0)), known)
     dim = known & (least < HARDLY_LIT)
     if np.count_nonzero(dim) < LEAST_POINTS:
-        return np.zeros(known.shape, np.float32)
-    lit_share = _falling(np.array(median(keeps[dim])), LIT, BLACK)
+        return LitShadows(np.zeros(known.shape, np.float32), 0.0)
+    share = float(_falling(np.array(median(keeps[dim])), LIT, BLACK))
     each = _falling(least, DARK, DIM) * np.maximum(_falling(keeps, KEEPS, TURNS), _falling(next_least, DARK, DIM))
-    return np.asarray(np.float32(OFF_DEG) * lit_share * each * known, np.float32)
+    return LitShadows(np.asarray(np.float32(OFF_DEG * share) * each * known, np.float32), share)
 
 
 def _of_lamp(ways: Floats, lamp: np.ndarray) -> Floats:

@@ -23,7 +23,7 @@ from psvideo.solve.normals.trust.added_light import Added, added_unseen, modelle
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
-from psvideo.solve.normals.trust.lit_shadows import shadows_deg
+from psvideo.solve.normals.trust.lit_shadows import LitShadows, shadows_of
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
@@ -50,6 +50,8 @@ times, five and six of them, or four, or four where albedo by slope counts as we
 much more. Over 490 sets of 4 to 8 lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go
 with that measure to the powers 0.4 to 0.6 (half of this one is used, ``few_power``), and not with the lights' condition
 number. More would trust less that is wrong, and claim medians that are over 1.5 times too large."""
+WHOLE = ("hidden", "plain", "shadows_lit")
+"""What ``Signs`` says of all points at once."""
 LEAST_UNREACHED = 0.02
 """Light from around is known where at least this many lights, in the mean, do not reach a point."""
 
@@ -70,7 +72,7 @@ class Signs:
     lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
     shows it, under lights that can hardly be held against each other (``by_slope.py``); ``by_colour_deg`` as its
     colour does (``by_colour.py``). ``shadows_deg``: by how much they may be where a shadow that is lit from around
-    passes for light (``lit_shadows.py``)."""
+    passes for light (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -88,11 +90,12 @@ class Signs:
     by_slope_deg: Floats | float = 0.0
     by_colour_deg: Floats | float = 0.0
     shadows_deg: Floats | float = 0.0
+    shadows_lit: float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
         shape = self.misfit_deg.shape
-        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("hidden", "plain")}
+        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in WHOLE}
         here: dict[str, Any] = {name: np.broadcast_to(value, shape)[some] for name, value in each.items()}
         return replace(self, **here)
 
@@ -122,6 +125,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     if by_slope and not one.moved:  # what was not followed goes with it too
         unseen, added = unseen_share(one.lit), added_unseen(one.lit)
     turned_by_it_deg = modelled_deg(points, one, still) if added else 0.0
+    shadows = shadows_of(points, one.lit, still) if unseen else LitShadows(np.zeros_like(noise), 0.0)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
     return Signs(
         misfit_deg=misfit_deg,
@@ -140,7 +144,8 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         if unseen or added
         else 0.0,
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
-        shadows_deg=np.float32(unseen) * shadows_deg(points, one.lit, still) if unseen else 0.0,
+        shadows_deg=np.float32(unseen) * shadows.off_deg,
+        shadows_lit=shadows.lit,
     )
 
 
