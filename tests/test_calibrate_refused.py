@@ -118,6 +118,19 @@ def test_pictures_that_a_rig_knows_nothing_of_are_named_with_the_rig(
     )
 
 
+def test_a_room_of_which_there_is_no_picture_is_said_to_be_taken_as_dark(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its light counts as the lamps': a card that it lit to 0.15 made a lamp of 0.5 one of 0.72."""
+    words = ["calibrate", "matte-sphere", str(shot[0]), "--circle", "95.3,71.8,60", "-o"]
+    assert main([*words, str(shot[0].with_name("rig.toml"))]) == 0
+    assert "the room is assumed dark" in capsys.readouterr().out
+    black = np.zeros_like(sphere_pictures(ways(1), np.ones((1, 3))).images[0])
+    write_exr(shot[0] / "ambient.exr", {c: black[..., k] for k, c in enumerate("RGB")}, half=False)
+    assert main([*words, str(shot[0].with_name("again.toml"))]) == 0
+    assert "the room is assumed dark" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [

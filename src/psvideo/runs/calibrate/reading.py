@@ -68,4 +68,10 @@ def warn_of_unmeasured(known: Rig, names: Sequence[str], caller: Caller) -> None
 
 def pictures_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightPictures:
     """Return the mean picture of a scene under each light, and hand on what is odd about the pictures."""
-    return mean_of_sets(sets_of(path, reading, watch=watch, caller=caller).sets)
+    opened = sets_of(path, reading, watch=watch, caller=caller)
+    if opened.taken_as_dark:
+        caller.say(
+            "No picture is named ambient or dark, so the room is assumed dark. If it was not, its light counts as the "
+            "lamps': take a picture with every lamp off as well."
+        )
+    return mean_of_sets(opened.sets)

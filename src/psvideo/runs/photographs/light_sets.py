@@ -46,13 +46,15 @@ RUN_PX = 16
 class LightSets:
     """What shows each light by itself, as many times as it was taken. ``sets`` can be gone through once.
 
-    ``room`` is a picture under room light, where one lies beside stills or plates.
+    ``room`` is a picture under room light, where one lies beside stills or plates; ``taken_as_dark`` whether nothing
+    shows these with all lamps off.
     """
 
     name: str
     names: tuple[str, ...]
     sets: Iterator[LightPictures]
     room: NDArray[np.float32] | None = None
+    taken_as_dark: bool = False
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -191,6 +193,7 @@ def _of_files(files: LightFiles, planned: Encoding | None, reading: Reading) -> 
         names=files.names,
         sets=sets,
         room=room,
+        taken_as_dark=not files.ambient and not files.ambient_is_off,
         warnings=(*aside, *_uneven(files)),
         notes=notes,
     )
