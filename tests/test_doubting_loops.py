@@ -168,7 +168,10 @@ def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
     sure, more = of(signs.misfit_deg, signs.torn_deg)
     likely, likely_more = of(signs.likely_misfit_deg, signs.likely_torn_deg)
     least = np.maximum(likely**2 + likely_more, (how.by_model * signs.by_model_deg) ** 2)
-    return np.asarray(np.sqrt(np.maximum(sure**2 + more + signs.lost_deg**2, least - signs.noise_deg**2)))
+    beside = np.maximum(sure**2 + more + signs.lost_deg**2, least - signs.noise_deg**2)
+    most = how.length_beside * np.maximum(np.sqrt(beside) - how.length_from_deg, 0)
+    own = np.minimum(how.length * signs.by_length_deg, most)
+    return np.asarray(np.sqrt(beside + own**2))
 
 
 @pytest.mark.parametrize(("lights", "robust", "moving"), [(4, False, False), (8, False, True), (6, True, False)])
@@ -186,7 +189,14 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
         for unchecked in (0.0, np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)):
             counted, share = 3 * unchecked, np.asarray(unchecked, np.float32) / np.float32(9)
             signs, of_numpy = (
-                replace(each, unchecked_deg=unchecked, by_model_deg=counted, torn_share=share, by_slope_deg=unchecked)
+                replace(
+                    each,
+                    unchecked_deg=unchecked,
+                    by_model_deg=counted,
+                    torn_share=share,
+                    by_slope_deg=unchecked,
+                    by_length_deg=unchecked,
+                )
                 for each in (found, true)
             )
             claimed, expected = doubt_deg(signs, how=how), doubt_in_numpy(of_numpy, how)

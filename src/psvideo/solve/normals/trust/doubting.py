@@ -29,6 +29,9 @@ class Doubting:
         there are more, where normals are as good as elsewhere. Under lights that can hardly be held against each other
         nothing else speaks, and they count without that limit (``unchecked.py``).
     by_model: the whole error is at least this share of the angle by which the subject's model would turn the normal.
+    length, length_beside, length_from_deg: how much it counts where albedo and residuals stand out together, and up to
+        how many times of what all the rest is beyond some degrees: where nothing else speaks against a surface, edges
+        of paint and shadows are as good as it is.
 
     Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and virtual shapes of eight materials and under wrong rigs, under 5 to 96 lights, spread
@@ -47,6 +50,9 @@ class Doubting:
     torn_beside: float = 0.5
     torn_alone_deg: float = 0.1
     by_model: float = 0.75
+    length: float = 2.0
+    length_beside: float = 4.0
+    length_from_deg: float = 2.0
 
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
@@ -71,4 +77,6 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     doubt = np.empty(planes.shape[1:], np.float32)
     factors = kernel.Factors(*np.array(counts, np.float32))
     kernel.fill_doubt(planes.reshape(len(planes), -1), factors, doubt.reshape(-1))
-    return doubt
+    own_deg = np.maximum(np.float32(how.length_beside) * (doubt - np.float32(how.length_from_deg)), np.float32(0))
+    own_deg = np.minimum(np.float32(how.length) * signs.by_length_deg, own_deg)
+    return np.asarray(np.hypot(doubt, own_deg), np.float32)

@@ -3,9 +3,10 @@
 These signs are looked for on a coarse grid, and around every pixel, since they are smooth where noise is not. What the
 lights leave unexplained says how far the model is from the surface. Light that shows where a lamp does not reach came
 by way of other surfaces, which light everything alike and leave no residual. And normals that belong to no surface are
-wrong whatever the lights say of them (``torn.py``). Where lights can hardly be held against each other, albedo that
-goes with the slope shows what turns normals (``by_slope.py``), albedo that pales what is mirrored (``by_colour.py``),
-and normals that keep one angle to a lamp its shadow (``lit_shadows.py``).
+wrong whatever the lights say of them (``torn.py``). A pixel whose albedo stands out where its residuals do is off by
+itself (``by_length.py``). Where lights can hardly be held against each other, albedo that goes with the slope shows
+what turns normals (``by_slope.py``), albedo that pales what is mirrored (``by_colour.py``), and normals that keep one
+angle to a lamp its shadow (``lit_shadows.py``).
 """
 
 import math
@@ -21,6 +22,7 @@ from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.added_light import Added, added_unseen, modelled_deg
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
+from psvideo.solve.normals.trust.by_length import by_length_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
 from psvideo.solve.normals.trust.lit_shadows import LitShadows, shadows_of
@@ -72,7 +74,9 @@ class Signs:
     lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
     shows it, under lights that can hardly be held against each other (``by_slope.py``); ``by_colour_deg`` as its
     colour does (``by_colour.py``). ``shadows_deg``: by how much they may be where a shadow that is lit from around
-    passes for light (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1."""
+    passes for light (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1.
+    ``by_length_deg``: by how much albedo and residuals stand out together beyond what is usual around a point
+    (``by_length.py``)."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -91,6 +95,7 @@ class Signs:
     by_colour_deg: Floats | float = 0.0
     shadows_deg: Floats | float = 0.0
     shadows_lit: float = 0.0
+    by_length_deg: Floats | float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
@@ -146,6 +151,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
         shadows_deg=np.float32(unseen) * shadows.off_deg,
         shadows_lit=shadows.lit,
+        by_length_deg=0.0 if one.moved else by_length_deg(points, squares, noise),
     )
 
 
