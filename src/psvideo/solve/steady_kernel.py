@@ -190,24 +190,40 @@ def _add(votes: Bytes, i: int, rounds: int, source: int, valid: int, changed: bo
 
 @FUSED.inlined
 def _decide(votes: Bytes, i: int, own: int, valid: int, block: int, work: Floats) -> None:
-    """Give a pixel the class that most rounds give it, and say whether it takes their mean."""
-    rounds, count = int(votes[ROUNDS, i]), int(votes[VALUES, i])
-    left = block - rounds  # rounds of the block before that count
-    whole = np.float32(block * block)
-    reached = np.float32(int(votes[REACHED, i]) * block + left * int(votes[REACHED_BEFORE, i])) / whole
-    sure = np.float32(int(votes[TRUSTED, i]) * block + left * int(votes[TRUSTED_BEFORE, i])) / whole
+    """Give a pixel the class that most rounds give it, and say whether it takes their mean.
+
+    own, valid: what this round gives it by itself, as in ``Surface.source`` and ``Surface.valid``. block: how many
+    rounds vote. A class that only a mean could show, where there is none of as many lights, is not taken.
+    """
+    count = int(votes[VALUES, i])
+    before = max(block - count, 0) if votes[HAS_BEFORE, i] else 0  # rounds for which the mean from before stands
+    has_mean = count + before > 0
+    reached = _mean_vote(votes, REACHED, REACHED_BEFORE, i, block)
     source = SOURCES[min(int(reached + HALF), 4)]
-    before = max(block - count, 0) if votes[HAS_BEFORE, i] else 0
-    known = count + before > 0
-    here = np.float32(votes[REACHED, i]) >= SURELY * np.float32(rounds)
-    measured = here or (votes[HAS_BEFORE, i] > 0 and reached >= SURELY)  # or else the mean is of fewer lights
-    if source != own and not (known and (source != MEASURED or measured)) and source != 0:
+    shown = source == own or source == 0 or (has_mean and (source != MEASURED or _is_measured(votes, i, reached)))
+    if not shown:
         source = own
-    trusted = (source == MEASURED) & (sure >= HALF)
+    trusted = (source == MEASURED) & (_mean_vote(votes, TRUSTED, TRUSTED_BEFORE, i, block) >= HALF)
     work[SOURCE, i], work[VALID, i] = source, trusted
     work[ZEROES, i] = source == 0
-    work[TAKES, i] = known and source != 0 and not (trusted and own == MEASURED and valid)
+    work[TAKES, i] = has_mean and source != 0 and not (trusted and own == MEASURED and valid)
     work[WEIGHT, i], work[PER, i] = before, ONE / np.float32(max(count + before, 1))
+
+
+@FUSED.inlined
+def _mean_vote(votes: Bytes, now: int, then: int, i: int, block: int) -> np.float32:
+    """Return the mean vote of a pixel over a block of rounds: those of this block so far, ``now``, and for the rest the
+    mean of the block before, ``then``."""
+    left = block - int(votes[ROUNDS, i])
+    return np.float32(np.float32(int(votes[now, i]) * block + left * int(votes[then, i])) / np.float32(block * block))
+
+
+@FUSED.inlined
+def _is_measured(votes: Bytes, i: int, reached: np.float32) -> bool:
+    """Return whether nearly all rounds that a pixel's mean is of measured it, by three lights or more: those of this
+    block, or with a mean from before all that vote."""
+    here = np.float32(votes[REACHED, i]) >= SURELY * np.float32(int(votes[ROUNDS, i]))
+    return here or (votes[HAS_BEFORE, i] > 0 and reached >= SURELY)
 
 
 @FUSED.called
