@@ -24,7 +24,8 @@ from psvideo.model.surface import Surface
 from psvideo.plates.sequence import POOLED_ROUNDS
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.surface_bits import bits, stored
-from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
+from psvideo.solve.steady_kernel import SEGMENT, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
+from psvideo.solve.steady_votes import VOTES
 
 SHOWN = np.ones((1, 1), np.bool_)
 MOST_SINCE, ONCE_MORE = 255, np.uint8(1)
