@@ -85,4 +85,4 @@ def _is_measured(votes: Bytes, i: int, reached: np.float32) -> bool:
     """Return whether nearly all rounds that a pixel's mean is of measured it, by three lights or more: those of this
     block, or with a mean from before all that vote."""
     here = np.float32(votes[REACHED, i]) >= SURELY * np.float32(int(votes[ROUNDS, i]))
-    return here or (votes[HAS_BEFORE, i] > 0 and reached >= SURELY)
+    return bool(here or (votes[HAS_BEFORE, i] > 0 and reached >= SURELY))
