@@ -14,6 +14,7 @@ from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.cli.app import main
 from psvideo.formats.rig_toml import read_rig
+from psvideo.pictures.matte_sphere import matte_picture
 
 
 @pytest.mark.parametrize("focal_px", [None, 300.0])
@@ -60,6 +61,16 @@ def test_lamps_near_a_matte_sphere_are_where_they_stand(radii: float, within_deg
     assert off_deg(np.array([light.direction for light in found]), directions).max() < within_deg
     np.testing.assert_allclose([light.intensity for light in found], strengths, rtol=0.02)
     np.testing.assert_allclose([1 / light.nearness for light in found], radii, rtol=0.2)
+
+
+def test_the_picture_shows_a_near_lamp_as_it_is_fitted() -> None:
+    """The last row, the difference, is an even grey; of a distant lamp it was lighter where this one is nearest."""
+    pictures = sphere_pictures(ways(1), np.full((1, 3), 0.5), radii=5.0, noise=0.0)
+    outline = given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE)
+    shown = matte_picture(pictures, outline, measure_matte_sphere(pictures, outline))
+    grey = shown[-850:-350, 350:850].astype(float)  # of the last third, the ball's middle
+    assert grey.min() > 100
+    assert grey.max() - grey.min() < 6
 
 
 @pytest.mark.parametrize("room", [0.03, 0.1, 0.3])

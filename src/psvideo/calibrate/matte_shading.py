@@ -73,7 +73,7 @@ def matte_fit(
             return replace(nothing, lit=lit)
     vector, nearness = _near_lamp(normals, bright, usable, distant, least_cosine=least_cosine, flattest=flattest)
     length = float(np.linalg.norm(vector))
-    shown = _shading(normals, vector, nearness)[0]
+    shown = shading(normals, vector, nearness)[0]
     if nearness != 0:
         lit, weight = _weighed(bright, shown, usable, least_cosine * length, length)
     if lit.sum() < LEAST_PIXELS:
@@ -107,7 +107,7 @@ def _near_lamp(
     vector, nearness = distant, 0.0
     for _ in range(NEAR_ROUNDS):
         length = float(np.linalg.norm(vector))
-        shown, change = _shading(normals, vector, nearness)
+        shown, change = shading(normals, vector, nearness)
         lit, weight = _weighed(bright, shown, usable, least_cosine * length, length)
         if not lit.any():
             return distant, 0.0
@@ -118,7 +118,7 @@ def _near_lamp(
     return vector, nearness
 
 
-def _shading(normals: Doubles, vector: Doubles, nearness: float) -> tuple[Doubles, Doubles]:
+def shading(normals: Doubles, vector: Doubles, nearness: float) -> tuple[Doubles, Doubles]:
     """Return what a sphere shows at normals (pixel, 3) under a lamp of strength times direction ``vector``, (pixel,),
     and how that changes with the vector and with ``nearness``, the ``q`` above, (pixel, 4)."""
     length = max(float(np.linalg.norm(vector)), 1e-12)

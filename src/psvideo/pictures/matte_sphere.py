@@ -7,6 +7,7 @@ import numpy as np
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.matte import MatteLight, sphere_normals
+from psvideo.calibrate.matte_shading import shading
 from psvideo.calibrate.sphere.outline import Outline
 from psvideo.model.arrays import Pixels
 from psvideo.pictures.contact import Strip, Tile, sheet
@@ -32,7 +33,8 @@ def matte_picture(pictures: LightPictures, outline: Outline, lights: Sequence[Ma
     for first in range(0, len(lights), PER_ROW):
         tiles: list[list[Tile]] = [[], [], []]
         for n, light in enumerate(lights[first : first + PER_ROW], first):
-            shade = np.maximum(normals @ light.direction, 0).reshape(high, wide) * inside
+            reached, _ = shading(normals, light.direction, light.nearness)
+            shade = np.maximum(reached, 0).reshape(high, wide) * inside
             level = float((grey[n] * shade).sum() / max((shade**2).sum(), 1e-12))
             exposure = 0.8 / max(level, 1e-6)
             made = level * shade
