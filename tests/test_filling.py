@@ -98,6 +98,20 @@ def test_two_lights_and_the_albedo_around_give_the_normal_and_one_light_nearly(
         assert (apart[where] <= 2 * surface.error_deg[where]).mean() > 0.75
 
 
+def test_a_surface_that_turns_from_one_side_of_two_lights_to_the_other_is_followed() -> None:
+    """Where both normals that they leave are one, neighbours that turn on tell which of the two comes next."""
+    normals, _ = ball()
+    lights = ring(3, 55)
+    surface = Solving(error=True).solve(plates_of(normals, np.array([0.5, 0.4, 0.3]), lights=lights), lit_by(lights))
+    assert surface.source is not None
+    two = surface.source == TWO_LIGHTS
+    assert two.sum() > 3000
+    off_deg = angles_deg(surface.normals, normals)[two]
+    assert off_deg.mean() < 6
+    assert surface.error_deg is not None
+    assert (off_deg <= 2 * surface.error_deg[two]).mean() > 0.95
+
+
 def test_a_picture_higher_than_wide_is_filled_as_a_square_one() -> None:
     normals, _ = ball()
     plates = plates_of(normals, np.array([0.5, 0.4, 0.3]), noise=0.0)

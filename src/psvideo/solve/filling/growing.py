@@ -21,6 +21,8 @@ from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
 
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
 MOST_STEPS = np.float32(50)
+ONWARD_OF_TWO, ONWARD = np.float32(1.0), np.float32(0.6)  # of neighbours' bend: all of it would burst from noise,
+# but for two lights, which leave less room for it
 BEHIND_PX = 2  # a normal beside a hole is held against those no farther from it that do not border on one,
 ODD = np.float32(np.cos(np.radians(10.0)))  # and is another than theirs from this angle on
 
@@ -149,12 +151,13 @@ def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
 @FUSED.called
 def _estimate(p: Tiles, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
-    nx, ny, nz, albedo, reds, blues = from_neighbours(p, s, row, col)
     count = s.reached[pixel]
+    onward = ONWARD_OF_TWO if count == 2 else ONWARD
+    nx, ny, nz, albedo, reds, blues, tx, ty, tz = from_neighbours(p, s, row, col, onward)
     if count == THREE_LIGHTS:
-        nx, ny, nz, albedo = from_three(s, pixel, nx, ny, nz, albedo)
+        nx, ny, nz, albedo = from_three(s, pixel, nx, ny, nz, albedo, tx, ty, tz)
     elif count == 2:
-        nx, ny, nz, albedo = from_two(s, pixel, nx, ny, nz, albedo)
+        nx, ny, nz, albedo = from_two(s, pixel, nx, ny, nz, albedo, tx, ty, tz)
     elif count == 1:
         nx, ny, nz, albedo = from_one(s, pixel, nx, ny, nz, albedo)
     # lights that shine from almost one direction, or straight along the normal, leave a vector that is no unit one

@@ -13,6 +13,7 @@ from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
 ALBEDO_SHARE = np.float32(0.1)  # how well the neighbours' albedo is that of a pixel
 BENT = np.float32(np.radians(15.0))  # how well the neighbours' normal is
+LEVEL = np.float32(np.radians(8.0))  # how well what they know of the surface across the way to it is
 BEYOND = np.float32(0.1)  # what faces away from the camera costs: squared over this
 ANGLES = np.radians(np.arange(-88.0, 89.0, 2.0)).astype(np.float32)
 ANGLE_STEP = np.float32(np.radians(2.0))
@@ -27,9 +28,11 @@ LEAST_COSINE, LEAST_SINE_SQUARED = np.float32(0.05), np.float32(1e-3)
 
 @FUSED.inlined
 def from_two(
-    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """The normal of those that two lights leave that fits the neighbours' normal (nx, ny, nz) and albedo best.
+    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32,
+    tx: np.float32, ty: np.float32, tz: np.float32,
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:  # fmt: skip
+    """The normal of those that two lights leave that fits the neighbours' normal (nx, ny, nz) and albedo best, and
+    is level along the vector (tx, ty, tz) in the surface that they know.
 
     Where there are no neighbours, ``albedo`` is 0 and does not count. Returned with the albedo.
     """
@@ -48,12 +51,14 @@ def from_two(
     guess = np.arctan2(nx * dx + ny * dy + nz * dz, nx * gx + ny * gy + nz * gz)
     offset = np.log(max(length, TINY)) - np.log(albedo) if albedo > ZERO else ZERO
     per_albedo = ONE / ALBEDO_SHARE if albedo > ZERO else ZERO
+    level_g, level_d = (gx * tx + gy * ty + gz * tz) / LEVEL, (dx * tx + dy * ty + dz * tz) / LEVEL
     best, least, before, last, after, closing = 0, FAR, ZERO, ZERO, ZERO, False
     for k in range(len(ANGLES)):
         apart = abs(ANGLES[k] - guess)
         apart = min(apart, TURN - apart)
         away = max(-(gz * COSINES[k] + dz * SINES[k]), ZERO) / BEYOND
-        cost = ((offset - LOG_COSINES[k]) * per_albedo) ** 2 + (apart / BENT) ** 2 + away * away
+        level = level_g * COSINES[k] + level_d * SINES[k]
+        cost = ((offset - LOG_COSINES[k]) * per_albedo) ** 2 + (apart / BENT) ** 2 + away * away + level * level
         if closing:
             after, closing = cost, False
         if cost < least:
@@ -72,8 +77,9 @@ def from_two(
 
 @FUSED.inlined
 def from_three(
-    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32,
+    tx: np.float32, ty: np.float32, tz: np.float32,
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:  # fmt: skip
     """The normal and albedo that three lights give, where a fourth is left out; where these stand nearly in a plane, or
     give what faces away from the camera, that of the two brightest and the neighbours."""
     first, second, third = s.bright[pixel, 0], s.bright[pixel, 1], s.bright[pixel, 2]
@@ -83,14 +89,14 @@ def from_three(
     ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
     volume = ax * ux + ay * uy + az * uz
     if abs(volume) < LEAST_VOLUME:
-        return from_two(s, pixel, nx, ny, nz, albedo)
+        return from_two(s, pixel, nx, ny, nz, albedo, tx, ty, tz)
     one = ONE / volume
     vx, vy, vz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
     wx, wy, wz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     gx, gy = (first * ux + second * vx + third * wx) * one, (first * uy + second * vy + third * wy) * one
     gz = (first * uz + second * vz + third * wz) * one
     if not gz > ZERO:
-        return from_two(s, pixel, nx, ny, nz, albedo)
+        return from_two(s, pixel, nx, ny, nz, albedo, tx, ty, tz)
     length = np.sqrt(gx * gx + gy * gy + gz * gz)
     one = ONE / length
     return gx * one, gy * one, gz * one, length
