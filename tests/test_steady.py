@@ -213,6 +213,18 @@ def test_a_round_in_which_rows_were_missing_has_no_vote_there() -> None:
     assert held.since[-1, 0] == 2, "the first round counts: nothing is known to have changed before it"
 
 
+def test_what_moved_in_a_clip_s_first_round_is_not_held_in_the_next_one() -> None:
+    """A shadow that had just passed turned a wall's normals by 40 degrees, and stayed in the mean while all stood."""
+    first, second = some(2)
+    own = second.normals.copy()
+    held = steadied(None, first, 1, None, moved=np.arange(20)[:, None] < 8)
+    held = steadied(held, second, 2, RESTS)
+    apart = np.abs(second.normals - own).max(axis=-1)
+    assert apart[:8].max() < 1e-3, "as it was solved"
+    assert apart[8:].max() > 0.05, "pooled with the first"
+    assert (held.since[0, 0], held.since[-1, 0]) == (1, 2)
+
+
 def test_bytes_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
     for threads in ("1", "3"):

@@ -60,6 +60,14 @@ class Round:
     doubtful: NDArray[np.bool_] | None = None
 
     @property
+    def moved(self) -> NDArray[np.bool_] | None:
+        """On a coarse grid over the picture, (row, col), True where plates were moved, or no motion explains them; None
+        where nothing moved."""
+        if self.motion is None or self.unsure is None:
+            return None
+        return np.asarray(self.motion.moves | (self.unsure > 0).any(axis=0))
+
+    @property
     def time_s(self) -> float:
         """The middle of the instants that the round's plates show."""
         return float(np.mean([plate.time_s for plate in self.plates]))

@@ -160,7 +160,7 @@ class _RoundSolver:
             surface = _without(surface, one.doubtful)
         steady = steadied(
             self.steady, surface, one.number, one.stood, _shown(given.seen),
-            most_deg=most_claimed_deg(len(one.plates)), spare=self.solving.spare,
+            moved=one.moved, most_deg=most_claimed_deg(len(one.plates)), spare=self.solving.spare,
         )  # fmt: skip
         self.steady = None if self.one_by_one else steady
         plates, shown, mask = given.plates, given.shown, given.mask

@@ -29,6 +29,8 @@ from psvideo.solve.steady_votes import VOTES
 
 SHOWN = np.ones((1, 1), np.bool_)
 MOST_SINCE, ONCE_MORE = 255, np.uint8(1)
+EACH = 4
+"""Where something moved is held for this many rows and columns of the grid that motion is found on together."""
 EACH_SLOT = 256
 IN_FILES_FROM = 1 << 22
 """This many votes or values and more lie in files: every pixel of a clip that noise lets nobody trust would be held."""
@@ -77,6 +79,7 @@ def steadied(
     stood: Flags | None,
     shown: Flags = SHOWN,
     *,
+    moved: Flags | None = None,
     most_deg: float = math.inf,
     spare: Path | None = None,
 ) -> Steady:
@@ -88,12 +91,15 @@ def steadied(
         where that is not known, and all begins again.
     shown: on a grid, False where frames were missing that some light showed the picture in: what is not there has no
         vote, and where it was not the round before, a pixel begins again.
+    moved: on a grid, True where the round's plates were made with motion; None where nothing moved. What is held begins
+        there once more after a first round, of which nobody knows what changed before.
     most_deg: the error up to which a pixel is trusted, where errors hold nothing but what trust goes by: what most
         rounds trust claims no more.
     spare: a folder in whose files much of what is held lies; left out, in memory.
     """
     if held is None or stood is None or number != held.number + 1:
-        held, stood = Steady.beginning(surface, number, spare), np.ones((1, 1), np.bool_)
+        held = Steady.beginning(surface, number, spare)
+        stood = np.ones((1, 1), np.bool_) if moved is None else ~_coarse(moved)
     held.number = number
     held.since = _counted(_counted(held.since, stood), held.shown & shown, more=0)
     held.shown = shown
@@ -116,6 +122,13 @@ def steadied(
 
     over_ranges(hold, rows, each=max(BAND_PIXELS // cols, 1))
     return held
+
+
+def _coarse(moved: Flags) -> Flags:
+    """Return where anything moved, on a grid with a point for every EACH by EACH points."""
+    high, wide = (-(-size // EACH) for size in moved.shape)
+    whole = np.pad(moved, [(0, many * EACH - size) for many, size in zip((high, wide), moved.shape, strict=True)])
+    return np.asarray(whole.reshape(high, EACH, wide, EACH).any(axis=(1, 3)), np.bool_)
 
 
 def _counted(since: Bytes, stood: Flags, more: int = 1) -> Bytes:

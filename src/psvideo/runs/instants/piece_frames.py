@@ -57,11 +57,12 @@ def frames_of(job: Job, numbers: range) -> tuple[int, ...]:
 
 def _solved_from(job: Job, number: int) -> int:
     """Return the number of the first instant that the one with this number depends on: in the block of rounds before
-    its own, of which the instant before knows what moves; of an average, the same of the average before."""
+    its own, of which the two instants before know what moves (what moved in the first is not held); of an average, the
+    same of the average before."""
     average = job.over_time.denoise
     if average > 1:
         number = (number // average - 1) * average
-    return _first_of_block(number) - POOLED_ROUNDS - 1
+    return _first_of_block(number) - POOLED_ROUNDS - 2
 
 
 def _first_of_block(number: int) -> int:
