@@ -318,6 +318,7 @@ def test_light_that_clips_is_not_taken_for_lamps_that_flicker_or_flash_together(
     [
         (4.0, 0.0, "overexposed: clipped pixels account for .* a smaller aperture"),
         (6.0, 0.0, "overexposed: clipped pixels account for .* a smaller aperture"),
+        (12.0, 0.0, "overexposed: clipped pixels account for .* a smaller aperture"),
         (4.0, 1.5, "overexposed, most of it in all frames"),
     ],
 )
@@ -396,6 +397,26 @@ def test_below_360_degrees_times_are_right_too_where_light_was_read_by_another_c
     assert timing.phase_error_s is not None
     assert timing.phase_error_s < 0.1 * timing.row_time_s
     assert not any("LEDs" in note or "exposure is" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "read"),
+    [
+        (360.0, lambda light: srgb_share(np.maximum(light, 0).astype(np.float32))),
+        (180.0, lambda light: np.log1p(200 * np.maximum(light, 0)) / np.log(200)),
+        pytest.param(360.0, lambda light: np.maximum(light, 0) ** 2.2, marks=pytest.mark.campaign),
+    ],
+)
+def test_slow_leds_put_times_in_doubt_where_light_was_read_by_another_curve(
+    plan: Plan, degrees: float, read: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    """A curve that is only nearly the right one hides them: flashes were 58 us off at a claim of 2."""
+    seen = with_camera(plan, exposure_s=degrees / 360 * plan.camera.frame_period_s)
+    timing = timing_of(seen, read(in_columns(seen, 0, rise_s=8e-5, fall_s=6e-5)).mean(axis=2))
+    assert timing.half is not None
+    assert timing.phase_error_s is not None
+    assert abs(first_start_s(timing, seen) - 0.0123) < 2 * timing.phase_error_s
+    assert timing.phase_error_s < timing.row_time_s
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, maybe_otherwise_s, straight, straightened
 from psvideo.sync.rowfit.unknowns.freed import Freed, freed
 from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
-from psvideo.sync.rowfit.unknowns.misread import OtherCurve, misread
+from psvideo.sync.rowfit.unknowns.misread import OtherCurve, doubt_s, misread
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import across, restless
 from psvideo.sync.rowfit.unknowns.softness import misfit
@@ -146,10 +146,11 @@ def _rightly_read(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]
     """Return the best fit of some rows, read by another curve where that explains more than what the fit sets free."""
     best = _best_fit(plan, rows, start, free)
     if _strays(plan, best, free):
-        reading, unsure_s = misread(plan, best.rows, best.fit, free)
+        reading, others, unsure_s = misread(plan, best.rows, best.fit, free)
         if reading:
-            return _best_fit(plan, reading.of(rows), start, free), reading
-        best = replace(best, apart_s=float(np.hypot(best.apart_s, unsure_s)))
+            best = _best_fit(plan, reading.of(rows), start, free)
+            unsure_s = doubt_s(best.rows, best.fit, others)
+        return replace(best, apart_s=float(np.hypot(best.apart_s, unsure_s))), reading
     return best, None
 
 

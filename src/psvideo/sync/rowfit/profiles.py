@@ -126,6 +126,11 @@ class Profiles:
         return held
 
     @property
+    def clipped_share(self) -> float:
+        """Share of the rows' changes that is of pixels which clip, 0 to 1 and more."""
+        return 0.0 if self.doubt is None else float(self.doubt.std(axis=0).mean() / self.spread.mean())
+
+    @property
     def unclipped(self) -> Doubles:
         """How far each sample shows the light that fell, shape (frame, row): 1 where no pixel clips, and the less the
         more clipped ones may hide of what its row usually changes by."""

@@ -22,7 +22,8 @@ WIDE_SCALE = 0.05
 """The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
 GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL, "blur_s": BLUR}
 """The times, beside the clock's, that can be set free, and the signal of each."""
-EDGES = {"rise_s", "fall_s", "blur_s"}
+TAILS = ("rise_s", "fall_s")
+EDGES = {*TAILS, "blur_s"}
 """Those that make edges soft: what they change is worked out only where one is free."""
 LEAST_BLUR_ROWS = 0.05
 """A blur that is free stays this large, which is next to none: a row takes 0.1 % from either neighbour."""

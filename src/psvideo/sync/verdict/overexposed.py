@@ -12,9 +12,7 @@ TOO_BRIGHT = "Film with a smaller aperture, less gain or shorter flashes, so tha
 
 def overexposed(rows: Profiles) -> str:
     """Return that nearly all that rows change by are pixels which clip, and what to do; or nothing."""
-    if rows.doubt is None:
-        return ""
-    share = float(rows.doubt.std(axis=0).mean() / rows.spread.mean())
+    share = rows.clipped_share
     if share < MOSTLY:
         return ""
     return (

@@ -10,6 +10,7 @@ from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.tracking.ends import ends
+from psvideo.sync.rowfit.tracking.false_holes import without_false_holes
 from psvideo.sync.rowfit.tracking.holes import NEAR, settled, with_repeats
 from psvideo.sync.rowfit.tracking.instead import without_false_repeats
 from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, track
@@ -65,6 +66,7 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     numbering = seed.numbering
     kept = renumbered(rows, numbering)
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows))
+    tracked = without_false_holes(plan, kept, tracked, seed.frames)
     tracked = replace(tracked, beat=replace(tracked.beat, clock=clock_through(plan, tracked)))
     index, unsure = settled(plan, kept, tracked.index, tracked.beat)
     placed = ends(plan, kept, index, tracked.beat)

@@ -8,9 +8,9 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit, clearest, robust_loss
+from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, TAILS, Fit, clearest, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, FEIGNED, blurred_s, cleared, within_blur
+from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, FEIGNED, blurred_s, cleared, plausible, within_blur
 
 CLEAR = 5.0
 """A time leaves the plan's value only when it is off by this many standard errors."""
@@ -43,8 +43,9 @@ small step finds it. It is looked for up to this share of it, in steps of the sh
 off, it is another shutter."""
 PROBED_ROWS, PROBED_FRAMES = 60, 240
 """Rows and frames that it is looked for in."""
-TAILS, BLUR = ("rise_s", "fall_s"), "blur_s"
-"""Tails are freed together: a rise or a fall alone changes how long a flash seems, both together when."""
+BLUR = "blur_s"
+"""What tails are held against. They are freed together: a rise or a fall alone changes how long a flash seems, both
+together when."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +139,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     """
     slow = fitted(plan, rows, fit.beat, (*free, *tails))
     gain = taken_away(plan, rows, fit, slow)
-    if gain < SOFT or not _plausible(plan, slow.beat):
+    if gain < SOFT or not plausible(plan, slow.beat):
         return Freed(fit=fit, unsure_s=_hidden_s(rows, fit, slow) if _may_hide_tails(plan, rows, fit) else 0.0)
     row_time_s = fit.beat.row_time_s
     if row_time_s == 0.0:
@@ -148,7 +149,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     joint = fitted(plan, rows, start, (*free, *tails, BLUR))
     if taken_away(plan, rows, blurred, joint) < 0.0:  # no step led from the tails to where a blur alone is better
         joint = fitted(plan, rows, blurred.beat, (*free, *tails, BLUR))
-    both = joint if _plausible(plan, joint.beat) and taken_away(plan, rows, slow, joint) >= -WORTH else slow
+    both = joint if plausible(plan, joint.beat) and taken_away(plan, rows, slow, joint) >= -WORTH else slow
     apart_s = rms_apart_s(rows, slow.beat, both.beat)
     by_blur = max(taken_away(plan, rows, fit, blurred), 0.0)
     beyond = taken_away(plan, rows, fit, both) - by_blur
@@ -237,12 +238,6 @@ def _may_hide_tails(plan: Plan, rows: Profiles, fit: Fit) -> bool:
     plain = replace(rows, restless=None)
     told = max(plan.rise_s, plan.fall_s) > 0.0
     return not told and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
-
-
-def _plausible(plan: Plan, beat: Beat) -> bool:
-    """Return whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
-    longest_s = max(plan.shortest_flash_s, plan.rise_s, plan.fall_s)
-    return max(beat.rise_s, beat.fall_s) <= longest_s
 
 
 def _may_differ(plan: Plan) -> tuple[str, ...]:

@@ -63,6 +63,12 @@ def blurred_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     return min(losses, key=lambda more_s: losses[more_s])
 
 
+def plausible(plan: Plan, beat: Beat) -> bool:
+    """Return whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
+    longest_s = max(plan.shortest_flash_s, plan.rise_s, plan.fall_s)
+    return max(beat.rise_s, beat.fall_s) <= longest_s
+
+
 def cleared(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> float:
     """Return which share of what one fit leaves at edges, beyond what is left elsewhere, another fit takes away."""
     edges = at_edges(plan, rows, before.beat) | at_edges(plan, rows, after.beat)
