@@ -3,7 +3,8 @@
 Half of a flash then looks far more or far less than half as bright as all of it, alike where rows open in it and where
 they close. Another exposure with slow LEDs looks similar and moves all flashes, but it leaves rows in the middle of a
 flash unexplained. So where a fit needs either, the usual curves are tried in its place: each is fitted to what it makes
-of the rows, and X"""
+of the rows, and held against the rows as they were read.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
