@@ -1,15 +1,18 @@
 """Shadows that are lit from around pass for light that grazes, and show in normals that keep one angle to the lamp:
 where they do, the lights that reach a pixel give its normal."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bench.accuracy_measure import angles_deg
 from bench.predicted import SIZE
 
 from psvideo.model.surface import MEASURED, TWO_LIGHTS, Surface
+from psvideo.solve.filling.leaving_out import left_out
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
-from psvideo.solve.normals.trust.judging import looked_at
+from psvideo.solve.normals.trust.judging import judged, looked_at
 
 ROW, COL = (np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2) / (SIZE / 2)
 INSIDE = ROW**2 + COL**2 < 0.9
@@ -67,6 +70,19 @@ def test_of_four_lights_the_three_that_reach_a_shadow_give_its_normal() -> None:
     off_deg, before_deg = (angles_deg(one.normals[dark], BALL[dark]) for one in (surface, measured))
     assert before_deg.mean() > 5
     assert off_deg.mean() < before_deg.mean() / 2
+
+
+def test_under_nine_lights_none_is_left_out_since_a_byte_does_not_say_which() -> None:
+    ways = np.concatenate([FOUR[1:], np.repeat(FOUR[:1], 6, axis=0)])
+    plates = [np.maximum(BALL @ way, 0.03).astype(np.float32) for way in ways]
+    solving = Solving(solver="least-squares", error=True)
+    solved_, one, noise = solving.measured(
+        plates, Illumination(directions=ways, intensities=np.ones((len(ways), 1))), mask=INSIDE
+    )
+    doubted = replace(judged(solved_, one, noise), shadows_lit=1.0, valid=np.zeros_like(INSIDE))
+    assert doubted.error_deg is not None
+    doubted.error_deg[:] = 20
+    assert left_out(doubted, one, solved=solved_.valid) is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.001, 0.01])

@@ -20,6 +20,8 @@ as much.)"""
 LEAST_ERROR_DEG = 8.0
 """A normal that is predicted to be off by less is left as it was measured, trusted or not: where a lamp does graze a
 surface, two lights say less than three."""
+MOST_LIGHTS = 7
+"""Of so many lights a byte says which are left out; more lights check each other."""
 
 
 def left_out(surface: Surface, one: Evidence, *, solved: Mask) -> Bytes | None:
@@ -27,10 +29,11 @@ def left_out(surface: Surface, one: Evidence, *, solved: Mask) -> Bytes | None:
     light's number and one, added up, and 0 where all count. None where none is left out anywhere.
 
     The surface has its predicted errors. Nothing is left out of what is trusted, where shadows are black, or where the
-    solver leaves out what is dim; nor where four lights or more would be left, since fewer are used.
+    solver leaves out what is dim; nor where four lights or more would be left, since fewer are used, nor under more
+    than ``MOST_LIGHTS``.
     """
     ratio = DIM * surface.shadows_lit
-    if not ratio > one.usable.shadow_ratio or surface.error_deg is None:
+    if not ratio > one.usable.shadow_ratio or surface.error_deg is None or len(one.plates) > MOST_LIGHTS:
         return None
     doubtful = solved & ~surface.valid
     doubtful &= surface.error_deg > LEAST_ERROR_DEG
