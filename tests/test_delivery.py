@@ -16,7 +16,7 @@ from psvideo.cli.app import main
 from psvideo.cli.options.per_light import parse_weights
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
-from psvideo.export.preview_movie import even, write_movie, write_movies
+from psvideo.export.preview_movie import even, write_movie
 from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.programs.loading_notes import loading_note
 from psvideo.export.programs.nuke_script import nuke_script
@@ -206,20 +206,6 @@ def test_a_movie_shows_the_colours_that_it_was_given(codec: str, suffix: str, pi
     with pytest.raises(PsvideoError, match="no picture"):
         write_movie(path, [], fps=Fraction(24))
     assert [p.name for p in tmp_path.iterdir()] == [path.name], "a movie that fails leaves the one before"
-
-
-def test_movies_in_several_codings_are_made_in_one_pass_of_the_pictures(tmp_path: Path) -> None:
-    picture = np.random.default_rng(1).integers(0, 255, (64, 80, 3), dtype=np.uint8)
-    together = {"vp9": tmp_path / "both.mp4", "prores": tmp_path / "both.mov"}
-    write_movies(together, iter([picture] * 5), fps=Fraction(24))  # type: ignore[arg-type]
-    for codec, path in together.items():
-        alone = path.with_stem("one")
-        write_movie(alone, [picture] * 5, fps=Fraction(24), codec=codec)  # type: ignore[arg-type]
-        assert path.read_bytes() == alone.read_bytes()
-    missing = {"vp9": tmp_path / "none.mp4", "prores": tmp_path / "none.mov"}
-    with pytest.raises(PsvideoError, match=r"none\.mov.*no picture"):
-        write_movies(missing, [], fps=Fraction(24))  # type: ignore[arg-type]
-    assert not list(tmp_path.glob("*none*"))
 
 
 def test_a_movie_of_an_odd_width_has_the_same_bytes_whatever_else_runs(tmp_path: Path) -> None:

@@ -77,7 +77,8 @@ def test_a_sheen_under_four_lights_is_counted_in_what_normals_may_be_off_by(monk
     assert found.error_deg is not None
     assert before.error_deg is not None
     here = np.asarray(found.source == MEASURED)
-    np.testing.assert_array_equal(found.normals[here], before.normals[here])
+    same = (found.normals == before.normals).all(axis=-1)
+    assert same[here].mean() > 0.998, "a light is left out of single pixels that are doubted for it"
     assert off[here].mean() > 5
     within = [float((off <= 2 * error)[here].mean()) for error in (before.error_deg, found.error_deg)]
     assert within[0] < 0.5

@@ -5,8 +5,7 @@ needs an encoder under the GPL. Pictures are sRGB; the stream says so: primaries
 video range (ITU-T H.273). Encoders run with a fixed number of threads, so that the same pictures give the same bytes.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -54,61 +53,19 @@ def write_movie(path: Path, pictures: Iterable[Pixels], *, fps: Fraction, codec:
 
     Raises PsvideoError where the movie cannot be written.
     """
-    write_movies({codec: path}, pictures, fps=fps)
-
-
-def write_movies(paths: Mapping[Codec, Path], pictures: Iterable[Pixels], *, fps: Fraction) -> None:
-    """Write the same pictures as several movies, as ``write_movie`` does; each picture is made once for all of them."""
-    with ExitStack() as stack:
-        movies = [stack.enter_context(_Movie.written(path, CODINGS[codec], fps)) for codec, path in paths.items()]
-        for picture in pictures:
-            for movie in movies:
-                movie.add(picture)
-
-
-@dataclass(kw_only=True)
-class _Movie:
-    """A movie that is being written: its stream begins with the first picture."""
-
-    path: Path
-    container: av.container.OutputContainer
-    coding: _Coding
-    fps: Fraction
-    stream: VideoStream | None = None
-
-    @classmethod
-    @contextmanager
-    def written(cls, path: Path, coding: _Coding, fps: Fraction) -> "Iterator[_Movie]":
-        """Give a movie to add pictures to; it is there, whole, in the end."""
-        with (
-            whole_file(path) as beside,
-            _named(path),
-            av.open(str(beside), "w", format=coding.container, options=CONTAINING) as container,
-        ):
-            movie = cls(path=path, container=container, coding=coding, fps=fps)
-            yield movie
-            movie.end()
-
-    def add(self, picture: Pixels) -> None:
-        """Add a picture."""
-        with _named(self.path):
-            self.stream = self.stream or _stream(self.container, self.coding, picture, self.fps)
-            self.container.mux(self.stream.encode(_frame(picture, self.coding)))
-
-    def end(self) -> None:
-        """Write what the encoder still holds."""
-        if self.stream is None:
-            raise PsvideoError(f"{self.path}: there is no picture to make a movie of.")
-        self.container.mux(self.stream.encode(None))
-
-
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Say which movie it is that FFmpeg could not write."""
-    try:
-        yield
-    except av.FFmpegError as fault:
-        raise PsvideoError(f"{path}: the movie cannot be written ({fault}). Make room, then run again.") from fault
+    coding = CODINGS[codec]
+    with whole_file(path) as beside:
+        try:
+            with av.open(str(beside), "w", format=coding.container, options=CONTAINING) as container:
+                stream: VideoStream | None = None
+                for picture in pictures:
+                    stream = stream or _stream(container, coding, picture, fps)
+                    container.mux(stream.encode(_frame(picture, coding)))
+                if stream is None:
+                    raise PsvideoError(f"{path}: there is no picture to make a movie of.")
+                container.mux(stream.encode(None))
+        except av.FFmpegError as fault:
+            raise PsvideoError(f"{path}: the movie cannot be written ({fault}). Make room, then run again.") from fault
 
 
 def _stream(container: av.container.OutputContainer, coding: _Coding, picture: Pixels, fps: Fraction) -> VideoStream:

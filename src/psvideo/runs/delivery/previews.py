@@ -53,11 +53,11 @@ def write_preview(
     there holds the one before.
 
     How bright pictures are shown is set by the first instant, for the whole movie. A lone instant is relit for one
-    turn of the light.
+    turn of the light. Codings come one after the other: two encoders at once would hold more than memory's test allows.
     """
     from psvideo.export.preview_movie import (  # FFmpeg's libraries take memory: only where a movie is made
         even,
-        write_movies,
+        write_movie,
     )
 
     exposure = _exposure(preview, instants[0])
@@ -74,7 +74,8 @@ def write_preview(
             for _ in range(one.number, after):
                 yield shown
 
-    write_movies(paths, pictures(), fps=fps)
+    for codec, path in paths.items():
+        write_movie(path, pictures(), fps=fps, codec=codec)
 
 
 def _exposure(preview: Preview, first: PreviewedInstant) -> float:
