@@ -131,6 +131,19 @@ def test_a_room_of_which_there_is_no_picture_is_said_to_be_taken_as_dark(
     assert "the room is assumed dark" not in capsys.readouterr().out
 
 
+def test_too_few_measured_lights_make_no_rig_of_a_matte_sphere(
+    shot: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows, cols = np.mgrid[:150, :200]
+    disc = (0.5 * ((rows - 71.8) ** 2 + (cols - 95.3) ** 2 < 60**2)).astype(np.float32)
+    for name in "cd":  # pictures that no lamp shades
+        write_exr(shot[0] / f"{name}.exr", dict.fromkeys("RGB", disc), half=False)
+    rig = tmp_path / "rig.toml"
+    assert main(["calibrate", "matte-sphere", str(shot[0]), "--circle", "95.3,71.8,60", "-o", str(rig)]) == 1
+    assert "only 2 of 4 lights could be measured (c: " in capsys.readouterr().err
+    assert not rig.exists()
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [

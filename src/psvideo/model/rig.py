@@ -18,6 +18,16 @@ LEAST_LIGHTS = 3
 """Fewer lights give no normals."""
 
 
+def too_few_measured(measured: int, *, shown: int) -> bool:
+    """Return whether fewer than half of the lights that were shown were measured, or fewer than the three that normals
+    need, though so many were shown: what was measured is chance then.
+
+    >>> [too_few_measured(measured, shown=4) for measured in (1, 2, 3)], too_few_measured(1, shown=2)
+    ([True, True, False], False)
+    """
+    return 2 * measured < shown or measured < LEAST_LIGHTS <= shown
+
+
 def vector(values: Sequence[float] | Doubles) -> Vector:
     """Return three numbers as records hold them."""
     return float(values[0]), float(values[1]), float(values[2])

@@ -16,7 +16,7 @@ from psvideo.calibrate.mirror.mirror_doubts import doubts_of
 from psvideo.calibrate.mirror.sighting import Highlight, Sighting, cut_differently, lacking_for_positions
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
-from psvideo.model.rig import LEAST_LIGHTS
+from psvideo.model.rig import too_few_measured
 
 DISAGREE_DEG = 10.0
 """Directions from two spheres that differ by more, and do not meet in a point, cannot both be right."""
@@ -44,8 +44,7 @@ def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = 
 def check_enough(found: MirrorCalibration) -> None:
     """Raise PsvideoError where fewer than half of the lights were measured, or fewer than the three that normals need,
     though so many were shown: then what is there is hardly a mirror, and its highlights are chance."""
-    measured = sum(not light.fault for light in found.lights)
-    if 2 * measured < len(found.lights) or measured < LEAST_LIGHTS <= len(found.lights):
+    if too_few_measured(sum(not light.fault for light in found.lights), shown=len(found.lights)):
         raise PsvideoError(_few(found.lights, found.sightings))
 
 

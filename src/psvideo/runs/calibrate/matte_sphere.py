@@ -1,5 +1,6 @@
 """The whole of ``psvideo calibrate matte-sphere``."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
-from psvideo.model.rig import Rig
+from psvideo.model.rig import Rig, too_few_measured
 from psvideo.pictures.matte_sphere import matte_picture
 from psvideo.runs.calibrate.reading import (
     check_albedo,
@@ -68,7 +69,7 @@ def matte_sphere(
     - ``focal_px``: the focal length in pixels; left out, the view is assumed orthographic.
 
     Raises UsageError where an output exists or a number cannot be meant, and PsvideoError where no sphere is found or
-    no light can be measured.
+    too few lights can be measured (fewer than half, or than the three that normals need).
     """
     rig_path = rig_out(out, force=force)
     picture, of_failure = picture_beside(rig_path, force=force), picture_of_failure(rig_path)
@@ -86,10 +87,10 @@ def matte_sphere(
     lights = measure_matte_sphere(found, outline, albedo=albedo)
     rig = matte_rig(lights, view)
     shown = matte_picture(found, outline, lights)
-    write_png(picture if rig.lights else of_failure, shown)
-    if not rig.lights:
-        faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
-        raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {of_failure}.")
+    too_few = too_few_measured(len(rig.lights), shown=len(lights))
+    write_png(of_failure if too_few else picture, shown)
+    if too_few:
+        raise PsvideoError(f"{pictures}: {_few(lights, doubt)} See {of_failure}.")
     write_text(rig_path, format_rig(rig))
     if doubt:
         caller.warn(f"{pictures}: {doubt}")
@@ -109,6 +110,14 @@ def matte_sphere(
             "about the angle by which the sphere stands off the lens's axis: give `focal_px`"
         )
     return MatteCalibration(outline=outline, lights=tuple(lights), rig=rig, picture=picture)
+
+
+def _few(lights: Sequence[MatteLight], doubt: str) -> str:
+    lost = [light for light in lights if light.fault]
+    measured = len(lights) - len(lost)
+    what = f"only {measured} of {len(lights)} lights" if measured else "no light"
+    faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lost[:3])
+    return f"{what} could be measured ({faults})."
 
 
 def _found(path: Path, pictures: LightPictures, view: SphereView) -> Outline:
