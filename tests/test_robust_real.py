@@ -148,7 +148,8 @@ def test_over_real_objects_errors_under_few_lights_are_claimed_right_to_a_factor
             surface = Solving(error=True).solve(one.plates, one.lit, mask=case.mask)
             assert surface.error_deg is not None
             at = np.flatnonzero(known & surface.measured)
-            some = np.unravel_index(rng.choice(at, 2000), known.shape)  # all subjects alike
+            # all subjects alike, and the same lights whatever is solved
+            some = np.unravel_index(np.random.default_rng(1).choice(at, 2000), known.shape)
             off_deg.append(angles_deg(surface.normals[some], case.truth[some]))
             claim_deg.append(surface.error_deg[some].astype(float))
         assert np.median(claim_deg) > 0.5 * np.median(off_deg), case.name
