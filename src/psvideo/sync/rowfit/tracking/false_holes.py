@@ -21,7 +21,7 @@ from psvideo.sync.rowfit.unlit import lit_twins
 
 SHORT, EACH = 12, 1.4
 """Frames of a short stretch, and how many there are at least for every brightness of a row."""
-NEEDED = 0.95
+NEEDED = 0.8
 """A hole leaves less than this share of what frames leave without it: true ones left 0.02 to 0.36, and 0.57 to 0.78
 before a wall that turned fast, false ones 1.3 to 1.8."""
 
