@@ -70,6 +70,10 @@ def test_of_four_lights_the_three_that_reach_a_shadow_give_its_normal() -> None:
     off_deg, before_deg = (angles_deg(one.normals[dark], BALL[dark]) for one in (surface, measured))
     assert before_deg.mean() > 5
     assert off_deg.mean() < before_deg.mean() / 2
+    assert surface.error_deg is not None
+    claimed_deg = surface.error_deg[dark].astype(np.float64)
+    assert (off_deg <= 2 * claimed_deg).mean() > 0.9
+    assert np.median(claimed_deg) < 2 * np.percentile(off_deg, 90), "what fewer lights leave claims more"
 
 
 def test_under_nine_lights_none_is_left_out_since_a_byte_does_not_say_which() -> None:

@@ -202,7 +202,7 @@ def _covariances(sphere: MattePixels, n: int, moved: list[MattePixels], found: M
 _OUTLINE_UNSURE = "where the sphere's outline is, is not known well enough to say where the light is"
 _TOO_FLAT = (
     "it fades less towards its shadow than a matte sphere does under one lamp: light in the room (a picture named "
-    "ambient takes it off), another curve (`transfer`), or no matte paint"
+    "ambient takes it off), another curve (`transfer`), or paint that is not matte"
 )
 _CONTRADICTS = "its parts contradict each other: what is inside the outline is no matte sphere of one colour"
 

@@ -101,7 +101,7 @@ def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
             "lights as the plan does. If it does, add lights.",
         )
     elsewhere = distance_unknown_share(observed) > ELSEWHERE
-    of_distance = "most of it may stand elsewhere than it is taken to (see the line on distance), or "
+    of_distance = "most of it may be nearer or farther away than assumed (see the line on distance), or "
     return Judgement(
         subject="rig",
         grade="doubtful" if elsewhere else grade,

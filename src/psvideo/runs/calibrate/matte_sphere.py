@@ -90,7 +90,7 @@ def matte_sphere(
     too_few = too_few_measured(len(rig.lights), shown=len(lights))
     write_png(of_failure if too_few else picture, shown)
     if too_few:
-        raise PsvideoError(f"{pictures}: {_few(lights, doubt)} See {of_failure}.")
+        raise PsvideoError(f"{pictures}: {_few(lights, doubt)} {of_failure} shows where it was taken to be.")
     write_text(rig_path, format_rig(rig))
     if doubt:
         caller.warn(f"{pictures}: {doubt}")
@@ -117,7 +117,10 @@ def _few(lights: Sequence[MatteLight], doubt: str) -> str:
     measured = len(lights) - len(lost)
     what = f"only {measured} of {len(lights)} lights" if measured else "no light"
     faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lost[:3])
-    return f"{what} could be measured ({faults})."
+    return (
+        f"{what} could be measured ({faults}). Expected a matte sphere of one colour, lit by one lamp in each picture, "
+        "in a dark room or with a picture named ambient that takes the room's light off."
+    )
 
 
 def _found(path: Path, pictures: LightPictures, view: SphereView) -> Outline:
