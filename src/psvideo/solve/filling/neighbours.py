@@ -70,6 +70,35 @@ def misfit(s: Said, pixel: int, x: np.float32, y: np.float32, z: np.float32) -> 
 
 
 @FUSED.inlined
+def _level_across(
+    down: np.float32, right: np.float32, vy: np.float32, vx: np.float32, vxy: np.float32,
+    nx: np.float32, ny: np.float32, nz: np.float32,
+    x_row: np.float32, y_row: np.float32, z_row: np.float32, x_col: np.float32, y_col: np.float32, z_col: np.float32,
+) -> tuple[np.float32, np.float32, np.float32]:  # fmt: skip
+    """The vector that lies in the surface across the way from the neighbours to the pixel, whose mean place is
+    (down, right) of it, with (co)variances (vy, vx, vxy), from their mean normal and what it changes by for each row
+    and column; 0 where they lie all around."""
+    away = np.sqrt(down * down + right * right)
+    if not away > LEAST_AWAY_PX:
+        return ZERO, ZERO, ZERO
+    # slopes, -x / z for each column (p) and y / z for each row (q), and what they change by
+    z = max(nz, LEAST_FACING)
+    slope_p, slope_q, one = -nx / z, ny / z, ONE / z
+    p_row, p_col = (-x_row - slope_p * z_row) * one, (-x_col - slope_p * z_col) * one
+    q_row, q_col = (y_row - slope_q * z_row) * one, (y_col - slope_q * z_col) * one
+    # along the way u that growth goes, and across it
+    u_row, u_col = -down / away, -right / away
+    across = slope_q * u_col - slope_p * u_row
+    one_way = (q_col * u_col + q_row * u_row) * u_col - (p_col * u_col + p_row * u_row) * u_row
+    other_way = (p_row * u_col - p_col * u_row) * u_col + (q_row * u_col - q_col * u_row) * u_row
+    along_spread = vy * u_row * u_row + vx * u_col * u_col + np.float32(2) * vxy * u_row * u_col
+    across_spread = vy * u_col * u_col + vx * u_row * u_row - np.float32(2) * vxy * u_row * u_col
+    across += away * (one_way * along_spread + other_way * across_spread) / (along_spread + across_spread)
+    one = ONE / np.sqrt(ONE + across * across)
+    return -u_row * one, -u_col * one, across * one
+
+
+@FUSED.inlined
 def from_neighbours(
     p: Tiles, s: Said, row: int, col: int, onward: np.float32
 ) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
@@ -136,24 +165,9 @@ def from_neighbours(
     x_row, x_col = (ax * vx - bx * vxy) * determinant, (bx * vy - ax * vxy) * determinant
     y_row, y_col = (ay * vx - by * vxy) * determinant, (by * vy - ay * vxy) * determinant
     z_row, z_col = (az * vx - bz * vxy) * determinant, (bz * vy - az * vxy) * determinant
-    tx, ty, tz = ZERO, ZERO, ZERO
-    away = np.sqrt(down * down + right * right)
-    if away > LEAST_AWAY_PX:
-        # slopes, -x / z for each column (p) and y / z for each row (q), and what they change by
-        z = max(nz, LEAST_FACING)
-        slope_p, slope_q, one = -nx / z, ny / z, ONE / z
-        p_row, p_col = (-x_row - slope_p * z_row) * one, (-x_col - slope_p * z_col) * one
-        q_row, q_col = (y_row - slope_q * z_row) * one, (y_col - slope_q * z_col) * one
-        # along the way u that growth goes, and across it
-        u_row, u_col = -down / away, -right / away
-        across = slope_q * u_col - slope_p * u_row
-        one_way = (q_col * u_col + q_row * u_row) * u_col - (p_col * u_col + p_row * u_row) * u_row
-        other_way = (p_row * u_col - p_col * u_row) * u_col + (q_row * u_col - q_col * u_row) * u_row
-        along_spread = vy * u_row * u_row + vx * u_col * u_col + np.float32(2) * vxy * u_row * u_col
-        across_spread = vy * u_col * u_col + vx * u_row * u_row - np.float32(2) * vxy * u_row * u_col
-        across += away * (one_way * along_spread + other_way * across_spread) / (along_spread + across_spread)
-        one = ONE / np.sqrt(ONE + across * across)
-        tx, ty, tz = -u_row * one, -u_col * one, across * one
+    tx, ty, tz = _level_across(
+        down, right, vy, vx, vxy, nx, ny, nz, x_row, y_row, z_row, x_col, y_col, z_col
+    )  # fmt: skip
     nx -= onward * (down * x_row + right * x_col)
     ny -= onward * (down * y_row + right * y_col)
     nz -= onward * (down * z_row + right * z_col)
