@@ -1,6 +1,5 @@
 """Pictures for eyes.
 
-``quantity`` (any result), ``relighting`` with ``relit_kernel``, ``on_screen`` (light as pixels, with
-``averaging_kernel``), ``contact`` sheets, ``charts``, ``timing_sheet``, and what was found on a ``mirror_sphere`` or a
-``matte_sphere``.
+``quantity`` (any result), ``relighting`` with ``relit_kernel``, ``on_screen`` (light as pixels), ``contact`` sheets,
+``charts``, ``timing_sheet``, and what was found on a ``mirror_sphere`` or a ``matte_sphere``.
 """

@@ -42,25 +42,14 @@ def smaller_by_rows(read: Callable[[int, int], NDArray[np.floating]], shape: tup
 
 
 def _averaged(band: NDArray[np.floating], factor: int) -> Image:
-    """Average squares of a whole number of pixels, (channel, row, col)."""
-    from psvideo.pictures.averaging_kernel import fill_averages
-
+    """Average squares of a whole number of pixels, which OpenCV does several times faster; (channel, row, col)."""
     rows, cols = (size // factor for size in band.shape[:2])
-    channels = int(np.prod(band.shape[2:]))
-    small = np.empty((channels, rows, cols), np.float32)
-    if band.flags.c_contiguous:
-        fill_averages(_stored(band.reshape(len(band), -1)), factor, channels, small)
-        return small
-    for channel, plane in enumerate(np.moveaxis(band.reshape(*band.shape[:2], -1), -1, 0)):  # as results lie in memory
-        fill_averages(_stored(plane), factor, 1, small[channel : channel + 1])
-    return small
-
-
-def _stored(plane: NDArray[np.floating]) -> NDArray[np.float32] | NDArray[np.uint16]:
-    """Return a picture (row, sample) as compiled loops take it: halves by their bits, all others as float32."""
-    if plane.dtype == np.float16:
-        return np.ascontiguousarray(plane).view(np.uint16)
-    return np.ascontiguousarray(plane, np.float32)
+    if band.flags.c_contiguous and band.dtype == np.float32:
+        small = cv2.resize(band[: rows * factor, : cols * factor], (cols, rows), interpolation=cv2.INTER_AREA)
+        return np.moveaxis(np.asarray(small, np.float32).reshape(rows, cols, -1), -1, 0)
+    channels = np.moveaxis(band[: rows * factor, : cols * factor].reshape(rows * factor, cols * factor, -1), -1, 0)
+    squares = (np.ascontiguousarray(channel, np.float32) for channel in channels)
+    return np.stack([cv2.resize(one, (cols, rows), interpolation=cv2.INTER_AREA) for one in squares])
 
 
 def three_channels(image: Image) -> Image:

@@ -119,19 +119,15 @@ def filmed(take: SmallTake, folder: Path) -> Path:
     return clip
 
 
-def _make_small_ones(clip: Path) -> None:
-    """Halve a plate, as runs do with large pictures before they look for motion, and make pictures small for eyes."""
-    from psvideo.pictures.on_screen import smaller
+def _halve_one(clip: Path) -> None:
+    """Halve a plate, as runs do with large pictures before they look for motion."""
     from psvideo.plates.gather import gather
     from psvideo.plates.named_timing import read_or_find_timing
     from psvideo.sync.open_take import open_take
 
     take = open_take(clip)
     some = next(iter(gather(take, read_or_find_timing(take, None, first_light=None))))
-    picture = some.plates[0].picture
-    picture.halved()
-    for kind in (np.float32, np.float16):
-        smaller(picture.image().astype(kind), 8)
+    some.plates[0].picture.halved()
 
 
 def _as_floats(frames: Path) -> None:
@@ -152,7 +148,7 @@ def run_small(take: SmallTake) -> None:
     with tempfile.TemporaryDirectory(prefix="psvideo-compiling-") as folder:
         clip = filmed(take, Path(folder))
         normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
-        _make_small_ones(clip)
+        _halve_one(clip)
         if take.live:
             live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
 
