@@ -208,7 +208,7 @@ def clipped(folder: Path) -> Figure:
     frame = frames(clip)[5]
     marked = np.where((frame.max(axis=-1) > 0.99)[..., None], np.array([255, 0, 200], np.uint8), srgb(frame))
     tiles = [("frame", srgb(frame)), ("clipped pixels in magenta", marked)]
-    holes = ("normals: fewer than three lights left is grey", normal_colours(_normals(out)))
+    holes = ("normals, some of them estimated", normal_colours(_normals(out)))
     return figure([row("Clipped highlights", *tiles, holes)], said)
 
 
@@ -231,7 +231,7 @@ def dropped_frame(folder: Path) -> Figure:
     count = len(list((out / "valid").glob("*.exr")))
     worst = min(range(count), key=lambda place: float(exr(out / "valid", place).mean()))
     tiles = [("normals", normal_colours(_normals(out, worst))), ("valid is white", white(exr(out / "valid", worst)))]
-    return figure([row("A frame is missing: its rows have no normal in that round", *tiles)], said)
+    return figure([row("A frame is missing: its rows are not valid in that round", *tiles)], said)
 
 
 FAULTS: dict[str, Callable[[Path], Figure]] = {

@@ -34,7 +34,7 @@ def rolling_fan(folder: Path) -> Figure:
     file = sorted((folder / "open" / LIGHT).iterdir())[1]
     with OpenEXR.File(str(file)) as read:
         plate = np.asarray(read.channels()["RGB"].pixels, np.float32)
-    tiles.append(("40 a minute, open again for 1/12 s", _shown(plate)))
+    tiles.append(("40 a minute, open for 1/12 s", _shown(plate)))
     return figure([row("A fan at 720 turns a minute before a rolling shutter", *tiles)], said)
 
 
