@@ -80,7 +80,11 @@ def test_where_near_lights_do_not_say_how_far_the_subject_is_the_rig_is_not_blam
         misfit = Misfit(share=0.01, error_deg=1.0, distance_share=unknown)
         one.facts = KeptFacts(replace(facts, misfit=misfit) for facts in one.facts)
         (line,) = (each for each in judge_rig(one) if "one surface" in each.found)
-        assert ("may stand elsewhere" in line.found) == ("once the distance is known" in line.advice) == said
+        assert (
+            ("nearer or farther away than assumed" in line.found)
+            == ("once the distance is known" in line.advice)
+            == said
+        )
         assert line.grade == ("bad" if slopes < 0 and not said else "doubtful")
 
 

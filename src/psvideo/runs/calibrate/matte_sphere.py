@@ -90,7 +90,7 @@ def matte_sphere(
     too_few = too_few_measured(len(rig.lights), shown=len(lights))
     write_png(of_failure if too_few else picture, shown)
     if too_few:
-        raise PsvideoError(f"{pictures}: {_few(lights, doubt)} {of_failure} shows where it was taken to be.")
+        raise PsvideoError(f"{pictures}: {_few(lights, doubt)} See {of_failure}.")
     write_text(rig_path, format_rig(rig))
     if doubt:
         caller.warn(f"{pictures}: {doubt}")
