@@ -80,6 +80,19 @@ def test_every_file_of_the_project_that_a_page_names_is_there() -> None:
     assert sum(name.startswith("src/psvideo/") for _, name in named) >= 10
 
 
+DECISIONS = sorted(set((ROOT / "docs" / "decisions").glob("*.md")) - {ROOT / "docs" / "decisions" / "README.md"})
+PARTS = ("Context", "Decision", "Consequences", "Look again")
+
+
+@pytest.mark.parametrize("page", DECISIONS, ids=lambda path: path.stem)
+def test_a_decision_says_why_what_with_which_consequences_and_when_to_look_again(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    said = {(bold or heading).rstrip(".") for bold, heading in re.findall(r"\*\*([^*]+)\*\*|^## (.+)$", text, flags=re.M)}
+    assert set(PARTS) - said == set()
+    index = (page.parent / "README.md").read_text(encoding="utf-8")
+    assert f"]({page.name})" in index, "add it to the list of decisions"
+
+
 def test_contributing_has_a_line_for_every_room() -> None:
     rooms = {path.parent.name for path in (ROOT / "src" / "psvideo").glob("*/__init__.py")}
     lines = re.findall(r"^\| `(\w+)` \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
