@@ -87,7 +87,8 @@ PARTS = ("Context", "Decision", "Consequences", "Look again")
 @pytest.mark.parametrize("page", DECISIONS, ids=lambda path: path.stem)
 def test_a_decision_says_why_what_with_which_consequences_and_when_to_look_again(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    said = {(bold or heading).rstrip(".") for bold, heading in re.findall(r"\*\*([^*]+)\*\*|^## (.+)$", text, flags=re.M)}
+    found = re.findall(r"\*\*([^*]+)\*\*|^## (.+)$", text, flags=re.MULTILINE)
+    said = {(bold or heading).rstrip(".") for bold, heading in found}
     assert set(PARTS) - said == set()
     index = (page.parent / "README.md").read_text(encoding="utf-8")
     assert f"]({page.name})" in index, "add it to the list of decisions"
