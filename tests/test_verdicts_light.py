@@ -163,6 +163,25 @@ def test_ambient_lights_share_is_of_what_was_seen(unseen: tuple[int, int], dark_
     assert observed.facts[0].ambient == pytest.approx(0.08)
 
 
+@pytest.mark.parametrize("radius_px", [9, 14, 20, 60])
+def test_ambient_lights_share_is_that_on_a_subject_however_little_of_a_void_it_fills(radius_px: int) -> None:
+    height, width, noise, ambient = 270, 480, 0.002, 0.01
+    random = np.random.default_rng(5)
+    rows, cols = np.mgrid[:height, :width]
+    subject = np.hypot(rows - 120, cols - 200) < radius_px  # 0.2 to 9 % of the picture
+
+    def plate(light: str, level: float) -> LightPlate:
+        image = (level * subject + noise * random.normal(size=subject.shape)).astype(np.float32)
+        return LightPlate(
+            light=light, number=1001, time_s=0.0, picture=mixture_of(image), seen=np.ones(height, np.bool_)
+        )
+
+    observed = looked_at([plate(light, 0.3) for light in "abcd"], plate(AMBIENT, ambient))
+    by_chance = 3 * noise / np.sqrt(np.count_nonzero(subject[::4, ::4])) / (0.3 + ambient)
+    assert observed.facts[0].ambient == pytest.approx(ambient / (0.3 + ambient), abs=by_chance)
+    assert observed.facts[0].levels == pytest.approx((0.3,) * 4, rel=0.05)
+
+
 def test_what_is_dim_where_no_frame_saw_the_dark_slot_does_not_make_it_uneven() -> None:
     lit = LightPlate(
         light="a", number=1001, time_s=0.0, seen=np.ones(SIZE, np.bool_),

@@ -16,12 +16,17 @@ from psvideo.report.observe.motion import Motion
 from psvideo.report.observe.steadiness import Change
 from psvideo.report.observe.thinned import slips, step_of, thin_surface, thinned
 from psvideo.solve.filling.filled import holes_in
+from psvideo.solve.normals.plate_noise import noise_of
+from psvideo.solve.normals.solving import CERTAIN
 from psvideo.solve.passes.alpha_matte import lit_from
 
 LIT = 0.01
 """A pixel brighter than this share of saturation under any light is part of the scene, unless it is a dim backdrop's;
 of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
+FEW, FAR_BRIGHTER = 8, 3.0
+"""Of a small subject so many of the points looked at are bright, more than a sensor's hot pixels; they are so many
+times as bright as the brightest hundredth where that is not the subject's."""
 FAINT = 2.0**-12
 FEWEST_MOVING = 32
 """Of fewer points that move no share is known."""
@@ -101,8 +106,20 @@ def thinned_round(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     if mask is not None:
         subject = thinned(mask)
         return Seen(bright=bright, shown=shown, subject=subject, beyond=_beyond(most, subject))
-    lit = most > lit_from(most, min(LIT, DARKEST * quantile(most[::2, ::2], 0.99)))
+    lit = most > lit_from(most, _least_light(one, most))
     return Seen(bright=bright, shown=shown, subject=lit | holes_in(lit))
+
+
+def _least_light(one: Round, most: NDArray[np.float32]) -> float:
+    """Return from which light on a pixel may be the subject's, LIT at most. The brightest hundredth may be the noise
+    around a small subject: where something is far brighter, what does not stand out of noise is none of it."""
+    dim, bright = (DARKEST * quantile(some, share) for some, share in (
+        (most[::2, ::2], 0.99), (most, 1 - min(FEW / most.size, 0.01))
+    ))  # fmt: skip
+    if dim >= LIT or bright < FAR_BRIGHTER * dim:
+        return min(LIT, dim)
+    noise = noise_of([plate.picture for plate in one.plates])
+    return min(LIT, max(dim, min(bright, CERTAIN * max(noise.dark, noise.least))))
 
 
 def share_of(flags: Flags) -> float:
