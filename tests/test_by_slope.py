@@ -75,6 +75,33 @@ def test_paint_on_a_matte_surface_does_not_go_with_its_slope(seed: int, noise: f
         assert shown < 1
 
 
+def ball_in_stripes(shine: float, *, round_the_lens: bool) -> Case:
+    """Return a ball in stripes of two colours, 9 or 7 points wide, with a share of both in points that hold an edge."""
+    _, normals, inside = shapes()[0]
+    fine = np.mgrid[: 2 * SIZE, : 2 * SIZE] / 2 - (SIZE - 1) / 2
+    along = np.hypot(*fine) / 9 if round_the_lens else fine[0] / 7
+    paint = cv2.resize(np.where(along.astype(int) % 2, 0.6, 0.3), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+    ways, rng = ring(3, 45), np.random.default_rng(1)
+    half = (ways + UP) / np.linalg.norm(ways + UP, axis=1, keepdims=True)
+    plates = []
+    for way, between in zip(ways, half, strict=True):
+        light = paint * np.maximum(normals @ way, 0) + shine * np.maximum(normals @ between, 0) ** 12
+        plates.append((light * inside + rng.normal(0, 0.002, light.shape)).astype(np.float32))
+    return Case("ball", plates, Illumination(directions=ways, intensities=np.ones((3, 1))), normals, inside)
+
+
+@pytest.mark.parametrize("round_the_lens", [True, False])
+def test_stripes_round_a_ball_are_paint_though_they_go_as_its_slope_does(*, round_the_lens: bool) -> None:
+    """Slopes tell of every stripe, here and on the other side; but paint ends from one point to the next."""
+    case = ball_in_stripes(0, round_the_lens=round_the_lens)
+    assert shown_and_true_deg(case)[0] < 0.3
+    surface = Solving(error=True).solve(case.plates, case.lit, mask=case.mask)
+    assert np.array_equal(surface.valid, surface.source == MEASURED)
+    shown, true = shown_and_true_deg(ball_in_stripes(0.1, round_the_lens=round_the_lens))
+    assert true > 2
+    assert 0.6 < shown / true < 2
+
+
 def test_a_lens_that_darkens_its_corners_by_a_fifth_turns_nothing() -> None:
     row, col = (np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2) / (SIZE / 2)
     lens = 1 - 0.1 * (row**2 + col**2)

@@ -5,10 +5,10 @@ a sheen, clay, a highlight, light that every lamp adds, a lamp of another streng
 not what the lights take it for differs with the slope. (G. Alldrin, S. Mallick and D. Kriegman, "Resolving the
 generalized bas-relief ambiguity by entropy minimization", CVPR 2007: normals are right where albedo is most alike.)
 
-How albedo differs between neighbours is fitted by how smooth functions of their normals do. Edges of paint are
-outliers. Only what the white squares of a chess board over the subject tell of the black ones counts: the rest goes
-with the slope by chance. By how much albedo goes with the slope, and how the lights spread what is off along the normal
-and across it, says by how much normals are turned.
+How albedo differs between neighbours is fitted by how smooth functions of their normals do. Where it jumps from one
+point to the next paint ends, and that does not count. Only what the white squares of a chess board over the subject
+tell of the black ones counts: the rest goes with the slope by chance. By how much albedo goes with the slope, and how
+the lights spread what is off along the normal and across it, says by how much normals are turned.
 """
 
 from collections.abc import Sequence
@@ -30,6 +30,7 @@ from psvideo.solve.normals.trust.slope_pairs import (
     pairs_of,
     robustly,
     solved,
+    without_edges,
 )
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
@@ -64,7 +65,7 @@ def by_slope_deg(
     ``modelled_deg``."""
     normals, albedo, whole = averaged(points, known)
     bright = in_light_of_all(normals, albedo, lit, whole)
-    pairs = pairs_of(normals, albedo, bright)
+    pairs = pairs_of(normals, without_edges(points.brightness, known), bright) if bright.any() else None
     if pairs is None:
         return np.zeros(known.shape, np.float32)
     shown = np.zeros(known.shape, np.float32)
