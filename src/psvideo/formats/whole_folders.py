@@ -1,7 +1,7 @@
 """Output folders appear whole: written as a hidden folder beside their name, and renamed at the end.
 
-A run that was stopped leaves its hidden folder behind; ``resume`` goes on in it, and every file in it is whole. What
-the run was given is noted in both, so that a run with other inputs neither goes on nor is taken for done.
+A run that was stopped leaves its hidden folder behind; ``resume`` goes on in it, and every file in it is whole. Which
+folders may be written at all, ``free_folders`` knows.
 """
 
 import contextlib
@@ -12,19 +12,22 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from psvideo.errors import AllDoneError, PsvideoError, UsageError
+from psvideo.errors import PsvideoError
+from psvideo.formats.free_folders import (
+    SETTINGS,
+    UNFINISHED,
+    noted_settings,
+    refuse_folder,
+    refuse_what_came,
+    unfinished_folder_of,
+)
 from psvideo.formats.plan_toml import PLAN_FILE
-from psvideo.formats.whole_files import not_written, refuse_existing, write_text
-from psvideo.formats.written_files import note_written, refuse_others
+from psvideo.formats.whole_files import not_written, write_text
+from psvideo.formats.written_files import note_written
 
 if sys.platform != "win32":
     import fcntl
 
-SETTINGS = ".settings"
-"""In a folder that is or was written: a digest of what the run was given, so that only the same run resumes it."""
-UNFINISHED = ".*.partial*"
-"""Files that a run was writing when it was killed (``whole_files``); libraries that know kinds of files by their
-endings add one."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
 """What systems say of a disk, or of somebody's share of it, that is full."""
 KEPT = "What was finished is kept; the same command with `resume` goes on."
@@ -45,7 +48,7 @@ def whole_folder(
     """
     refuse_folder(path, mark=mark, force=force, resume=resume, settings=settings)
     path = path.resolve()
-    beside = _beside(path)
+    beside = unfinished_folder_of(path)
     with _said_where(path, resumable=bool(settings)):
         beside.mkdir(parents=True, exist_ok=True)
         with _held(beside, path):
@@ -57,7 +60,7 @@ def whole_folder(
                 write_text(beside / SETTINGS, settings)
             with _still_there(beside, path, settings), _kept_noted(beside, resumable=bool(settings)):
                 yield beside
-            _refuse_what_came(path, resumable=bool(settings))
+            refuse_what_came(path, resumable=bool(settings))
             if mark != PLAN_FILE:  # footage is never replaced, and a full disk costs none of it
                 note_written(beside)
             _replace(beside, path)
@@ -71,11 +74,11 @@ def begun_folder(path: Path, *, mark: str, force: bool = False, settings: str = 
     """
     refuse_folder(path, mark=mark, force=force, resume=True, settings=settings)
     path = path.resolve()
-    beside = _beside(path)
+    beside = unfinished_folder_of(path)
     with _said_where(path, resumable=bool(settings)):
         beside.mkdir(parents=True, exist_ok=True)
         with _held(beside, path, shared=True):
-            if _noted(beside) != settings:
+            if noted_settings(beside) != settings:
                 write_text(beside / SETTINGS, settings)
             with _still_there(beside, path, settings):
                 yield beside
@@ -84,14 +87,9 @@ def begun_folder(path: Path, *, mark: str, force: bool = False, settings: str = 
 def forget_begun(path: Path) -> None:
     """Remove what a run that was stopped left of an output, unless one is writing it now, which raises PsvideoError."""
     path = path.resolve()
-    if (beside := _beside(path)).is_dir():
+    if (beside := unfinished_folder_of(path)).is_dir():
         with _said_where(path), _held(beside, path):
             shutil.rmtree(beside)
-
-
-def unfinished_folder_of(path: Path) -> Path:
-    """Return the hidden folder in which an output is written until it is whole; it need not be there."""
-    return _beside(path.resolve())
 
 
 @contextlib.contextmanager
@@ -101,7 +99,7 @@ def _still_there(beside: Path, path: Path, settings: str) -> Iterator[None]:
     try:
         yield
     finally:
-        gone = _noted(beside) != settings
+        gone = noted_settings(beside) != settings
         if gone:
             shutil.rmtree(beside, ignore_errors=True)
     if gone:
@@ -171,69 +169,6 @@ def _remove(path: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
-
-
-def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, settings: str = "") -> None:
-    """Raise UsageError where an output folder exists and may not be replaced, or a stopped run not be resumed.
-
-    ``force`` replaces only what a run like this wrote: a folder that holds ``mark`` and no footage, and no file beside
-    those that the run noted; or nothing at all.
-    ``resume`` goes on with a stopped run of the same ``settings``; where there is none, and the folder was finished
-    with these and is not to be replaced, AllDoneError is raised.
-    """
-    stopped = _beside(path.resolve()).is_dir()
-    if resume and stopped:
-        _refuse_other_settings(path, settings)
-    elif resume and settings and not force and _noted(path) == settings:
-        raise AllDoneError(
-            f"{path}: all done. The run ended well, with the same footage and settings, so nothing was written."
-        )
-    footage = (path / PLAN_FILE).exists() and not mark.startswith("truth/")
-    refuse_existing(path, force=force or footage)
-    if not path.exists():
-        return
-    empty = path.is_dir() and not any(path.iterdir())
-    if footage:
-        raise UsageError(
-            f"{path}: exists already and holds a plan.toml: it is footage, and not replaced, not even with `force`. "
-            "Name another output."
-        )
-    if not empty and not (path / mark).is_file():
-        raise UsageError(
-            f"{path}: holds no {mark}, so it is nothing that this command wrote, and is not replaced, not even with "
-            "`force`. Name another output."
-        )
-    refuse_others(path)
-
-
-def _beside(path: Path) -> Path:
-    """Return the hidden folder in which a folder is written."""
-    return path.with_name(f".{path.name}.partial")
-
-
-def _noted(folder: Path) -> str:
-    """Return the digest of what a folder's run was given, empty where none is noted."""
-    noted = folder / SETTINGS
-    return noted.read_text(encoding="utf-8") if noted.is_file() else ""
-
-
-def _refuse_other_settings(path: Path, settings: str) -> None:
-    beside = _beside(path.resolve())
-    nothing_begun = all(one.match(UNFINISHED) for one in beside.iterdir())
-    if _noted(beside) != settings and not nothing_begun:
-        raise UsageError(
-            f"{path}: the run that was stopped here had other settings, footage, plan, rig or timing, and mixing both "
-            "would spoil the sequence. Give the same ones again, or leave `resume` out to start again."
-        )
-
-
-def _refuse_what_came(path: Path, *, resumable: bool) -> None:
-    """Raise PsvideoError where somebody saved a file meanwhile into the folder that is to be replaced."""
-    try:
-        refuse_others(path)
-    except UsageError as fault:
-        waits = " What was made now waits beside it: `resume` with `force` puts it in its place." if resumable else ""
-        raise PsvideoError(f"{fault}{waits}") from fault
 
 
 def _old_name(path: Path, process: str) -> str:

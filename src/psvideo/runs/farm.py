@@ -15,11 +15,12 @@ from psvideo.export.farm_job import (
     job_template,
     job_values,
 )
+from psvideo.formats.free_folders import refuse_folder
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import write_text
-from psvideo.formats.whole_folders import refuse_folder, whole_folder
+from psvideo.formats.whole_folders import whole_folder
 from psvideo.runs.steps.output import MARK, rounds_of
 from psvideo.sync.open_take import open_take
 

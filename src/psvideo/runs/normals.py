@@ -11,9 +11,9 @@ from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.usd import require_usd
+from psvideo.formats.free_folders import unfinished_folder_of
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
-from psvideo.formats.whole_folders import unfinished_folder_of
 from psvideo.model.choices import (
     PREVIEWS,
     USUAL_COMPRESSION,

@@ -10,10 +10,11 @@ from typing import Any, get_args
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
+from psvideo.formats.free_folders import refuse_folder
 from psvideo.formats.paths import path_of, take_name
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.formats.whole_files import write_text
-from psvideo.formats.whole_folders import forget_begun, refuse_folder
+from psvideo.formats.whole_folders import forget_begun
 from psvideo.report.takes_report import TakeResult, takes_page, takes_record, worst_first
 from psvideo.runs.many_takes.cluster import Cluster, connected
 from psvideo.runs.many_takes.handed_out import Shared, done_apart

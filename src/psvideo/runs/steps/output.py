@@ -13,7 +13,8 @@ from psvideo.export.sequences.tags import Tags, sha256_of
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.formats.clocks_json import read_clocks
 from psvideo.formats.frame_rates import broadcast_fps
-from psvideo.formats.whole_folders import begun_folder, refuse_folder, whole_folder
+from psvideo.formats.free_folders import refuse_folder
+from psvideo.formats.whole_folders import begun_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
 from psvideo.plates.align.comb import Comb, comb_of
