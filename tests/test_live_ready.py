@@ -16,8 +16,8 @@ from memory_frame import MemoryFrame
 
 import psvideo as ps
 from psvideo.cli.app import main
-from psvideo.cli.commands.live import _Telling
 from psvideo.cli.console import Voice
+from psvideo.cli.live_lines import LiveLines
 from psvideo.clip.streams.stream import OPEN_S
 from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_counted
 from psvideo.live.chain import Chain
@@ -113,7 +113,7 @@ def standing(*, at_s: float, state: LiveState, fps: float, frames: int, order: O
 def test_where_lines_stay_one_comes_when_something_changes_and_every_ten_seconds(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    told = _Telling(voice=Voice())
+    told = LiveLines(voice=Voice())
     held: list[tuple[LiveState, float]] = [("locked", 100.0)] * 26
     states: list[tuple[LiveState, float]] = [("seeking", 100), *held, ("locked", 0.0), ("locked", 0.0)]
     for second, (state, fps) in enumerate([*states, ("lost", 100.0)]):

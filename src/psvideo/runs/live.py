@@ -1,22 +1,20 @@
 """The whole of ``psvideo live``: a source in, the newest result shown, what it came to and its timing out."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from psvideo.errors import NoStrobeError, said_of
+from psvideo.errors import said_of
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.rig_folder import RIG_FILE, rig_beside
-from psvideo.formats.rig_toml import format_rig, read_rig
+from psvideo.formats.rig_folder import rig_beside
+from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import check_can_be_written, refuse_existing, write_text
 from psvideo.live.chain import Chain
-from psvideo.live.followed_timing import followed_timing
 from psvideo.live.following.lock import check_followed
-from psvideo.live.incoming.recording import FIRST_NUMBER, recorded_words, recording
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.incoming.sources import opened_source
 from psvideo.live.running import Running
@@ -25,16 +23,16 @@ from psvideo.live.showing.quality import first_quality
 from psvideo.live.status import LiveStatus, LiveSummary
 from psvideo.model.choices import Pace
 from psvideo.model.first_light import check_first_light
+from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
-from psvideo.model.timing import Timing
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
+from psvideo.runs.on_set.live_recorded import check_found, log_beside, recorded, said_what_is_recorded, timing_of
 from psvideo.runs.on_set.live_rehearsal import rehearse
 from psvideo.runs.on_set.live_strobe import held_strobe
 from psvideo.runs.on_set.live_viewed import PageAddress, check_gives_normals, rig_keeper, viewed
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.strobe.link.ports import AUTO
-from psvideo.strobe.runlog import LOG_NAME, RunLog, format_log
 
 
 def live(
@@ -96,45 +94,52 @@ def live(
     played = opened_source(str(source), plan=path_if_given("plan", plan), pace=pace, growing=growing, raw=raw)
     for warning in played.warnings:
         caller.warn(warning)
-    check_followed(played.plan)
-    check_separable(played.plan)
-    check_first_light(played.plan, first_light)
+    _check_can_be_followed(played.plan, first_light)
     known = _rig(rig, source, played, caller)
-    timing_path = path_if_given("timing_out", timing_out)
-    if timing_path is not None:
-        refuse_existing(timing_path, force=force, mark=TIMING)
-        check_can_be_written(timing_path)
+    timing_path = _free(path_if_given("timing_out", timing_out), force=force)
     running = _running(played, known, first_light, seconds, said, shown)
     running.prepare = lambda: rehearse(played, known, step=running.chain.step, page=page)
     kept = rig_keeper(path_if_given("rig_out", rig_out), force=force)
     address = PageAddress(host=host, port=port, token=token)
     record_path = path_if_given("record", record)
-    plan_path = path_if_given("plan", plan) or played.plan_path
-
-    def logged(log: RunLog) -> None:
-        if running.recording is not None:
-            running.recording.beside[LOG_NAME] = format_log(log)
-
     held = partial(
-        held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller, logged=logged
+        held_strobe,
+        running.chain,
+        path_if_given("plan", plan) or played.plan_path,
+        port=strobe,
+        yes=yes,
+        noted=running.notes.append,
+        caller=caller,
+        logged=partial(log_beside, running),
     )
     with (
-        _said_what_is_recorded(running, record_path, caller),
+        said_what_is_recorded(running, record_path, caller),
         viewed(running, known, address, kept=kept, opened=opened, caller=caller) if page else nullcontext(),
-        nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
-        nullcontext() if lock is None else held(plan_path, lock=lock) as holding,
+        recorded(running, record_path, known, force=force),
+        nullcontext() if lock is None else held(lock=lock) as running.holding,
     ):
-        running.holding = holding
-        running.recording = recorded
-        if recorded is not None and known is not None:
-            recorded.beside[RIG_FILE] = format_rig(known)
         summary = running.run()
-    if recorded is not None:
-        summary = replace(summary, recorded=recorded.written, notes=running.all_notes)
-    _check_found(running, record_path)
+    if running.recording is not None:
+        summary = replace(summary, recorded=running.recording.written, notes=running.all_notes)
+    check_found(running, record_path)
     if timing_path is not None:
-        write_text(timing_path, format_timing(_timing(running, record_path)))
+        write_text(timing_path, format_timing(timing_of(running, record_path)))
     return summary
+
+
+def _check_can_be_followed(plan: Plan, first_light: str | None) -> None:
+    """Raise PsvideoError where a plan's flashes cannot be followed, or told from each other."""
+    check_followed(plan)
+    check_separable(plan)
+    check_first_light(plan, first_light)
+
+
+def _free(path: Path | None, *, force: bool) -> Path | None:
+    """Return the path of the timing to write at the end. Raises UsageError where it cannot be, before the run."""
+    if path is not None:
+        refuse_existing(path, force=force, mark=TIMING)
+        check_can_be_written(path)
+    return path
 
 
 def _rig(named: Path | str | None, source: Path | str, played: LiveSource, caller: Caller) -> Rig | None:
@@ -153,37 +158,6 @@ def _rig(named: Path | str | None, source: Path | str, played: LiveSource, calle
     with said_of(path):
         check_gives_normals(known, played)
     return known
-
-
-def _check_found(running: Running, record_path: Path | None) -> None:
-    """Raise NoStrobeError where no strobe was found, with what was recorded all the same."""
-    if running.chain.follower is not None:
-        return
-    frames, recorded = running.chain.count.seen, running.recording
-    few = f"{running.source.name}: {frames} frames are too few to find the strobe in. Let it run for longer."
-    whole = "" if recorded is None or record_path is None else recorded_words(record_path, recorded)
-    raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
-
-
-def _timing(running: Running, record_path: Path | None) -> Timing:
-    """Return the timing of all that was followed, by the recording's name and numbers where one was made."""
-    source, named = running.source, running.chain.count.first_file
-    name, first = source.name, source.first_number if named is None else named
-    if record_path is not None:
-        name, first = record_path.resolve().name, FIRST_NUMBER
-    return followed_timing(running.chain, clip=name, first_number=first)
-
-
-@contextmanager
-def _said_what_is_recorded(running: Running, path: Path | None, caller: Caller) -> Iterator[None]:
-    """Say what a recording holds where somebody stops the block that makes it."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        record = running.recording
-        if path is not None and record is not None and record.written:
-            caller.warn(f"{recorded_words(path, record)} {record.ended}".rstrip())
-        raise
 
 
 def _running(

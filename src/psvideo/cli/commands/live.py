@@ -1,18 +1,16 @@
 """psvideo live: normals and relit light while the camera runs."""
 
 import json as texts
-import sys
 import webbrowser
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from math import inf
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from psvideo.cli.console import Voice, print_json
 from psvideo.cli.ending import stoppable
+from psvideo.cli.live_lines import LiveLines
 from psvideo.cli.options.clip_and_run import FirstLight, Force, PlanPath
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.strobe import Yes
@@ -20,11 +18,6 @@ from psvideo.errors import UsageError
 from psvideo.model.choices import Pace
 from psvideo.strobe.link.ports import AUTO
 
-if TYPE_CHECKING:
-    from psvideo.live.status import LiveStatus
-
-STAYS_S = 10.0
-"""Where lines are not written over, one comes this often as long as nothing changes."""
 STOPS = 2
 """The first Ctrl-C is how a live run ends; a second one leaves out what still waits for the disk."""
 
@@ -99,7 +92,7 @@ def live(
         return
     if not source:
         raise UsageError("Name what to watch: a clip, a URL, a device; psvideo live --list shows what there is.")
-    telling = _Telling(voice=voice)
+    lines = LiveLines(voice=voice)
     with stoppable(stops=STOPS):
         summary = watch(
             source,
@@ -122,12 +115,11 @@ def live(
             port=port,
             token=token,
             opened=lambda url: _open(voice, url, browser=not no_browser),
-            said=telling.say,
+            said=lines.say,
             caller=voice.caller(),
         )
-    if sys.stderr.isatty() and not (voice.json or voice.quiet):
-        print(file=sys.stderr)
-    telling.warn(summary.notes)
+    lines.end()
+    lines.warn(summary.notes)
     voice.say(summary.words)
     if voice.json:
         print_json(texts.dumps(summary.record))
@@ -152,45 +144,3 @@ def _open(voice: Voice, url: str, *, browser: bool) -> None:
     voice.say(f"{url} (Ctrl-C ends it)")
     if browser:
         webbrowser.open(url)
-
-
-@dataclass(kw_only=True)
-class _Telling:
-    """Says how things stand: a line that is written over on a terminal, one line of JSON a second for machines; and
-    what there is to say of the run when it comes up, each sentence once. Elsewhere lines stay, and say what is new."""
-
-    voice: Voice
-    warned: set[str] = field(default_factory=set)
-    waited: str = ""
-    stood: tuple[str, bool] = ("", False)
-    written_s: float = -inf
-
-    def say(self, status: "LiveStatus") -> None:
-        """Say what the last second was."""
-        over = "\r\x1b[K" if sys.stderr.isatty() and not self.voice.json else ""
-        words = status.all_words
-        if over and not self.warned.issuperset(words):
-            print(over, end="", file=sys.stderr)
-        self.warn(words)
-        if not status.waits_for:
-            self.warned.discard(self.waited)
-        self.waited = status.waits_for
-        if self.voice.json:
-            print_json(texts.dumps(status.record))
-        elif not self.voice.quiet and (over or self._is_news(status)):
-            print(f"{over}{status.line}", end="" if over else "\n", file=sys.stderr, flush=True)
-
-    def _is_news(self, status: "LiveStatus") -> bool:
-        """Return whether things stand otherwise than in the last line that stays, or that line is old."""
-        stands = (status.state, status.fps > 0)
-        news = stands != self.stood or status.at_s - self.written_s >= STAYS_S
-        if news:
-            self.stood, self.written_s = stands, status.at_s
-        return news
-
-    def warn(self, words: Sequence[str]) -> None:
-        """Warn of what was not yet said."""
-        for sentence in words:
-            if sentence not in self.warned:
-                self.voice.warn(sentence)
-                self.warned.add(sentence)
