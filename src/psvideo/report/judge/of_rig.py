@@ -5,13 +5,8 @@ from collections.abc import Iterator, Sequence
 from psvideo.model.units import listed
 from psvideo.report.judge.of_lamps import NAMED, weaker_than_rig
 from psvideo.report.judge.of_strengths import other_strengths
-from psvideo.report.judge.rig_by_normals import (
-    facing_away,
-    facing_inwards,
-    lights_crossed,
-    normals_lean,
-    surface_shines,
-)
+from psvideo.report.judge.rig_by_facing import facing_away, facing_inwards
+from psvideo.report.judge.rig_by_lean import normals_lean
 from psvideo.report.judge.rig_by_plates import (
     lights_exchanged,
     lights_near,
@@ -20,6 +15,7 @@ from psvideo.report.judge.rig_by_plates import (
     rig_misfits,
     shining_surface,
 )
+from psvideo.report.judge.rig_by_slopes import lights_crossed, surface_shines
 from psvideo.report.judge.rig_of_three import three_lights
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed

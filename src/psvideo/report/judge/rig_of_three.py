@@ -3,7 +3,7 @@
 import numpy as np
 
 from psvideo.model.arrays import Doubles
-from psvideo.report.judge.rig_by_normals import faces_outwards
+from psvideo.report.judge.rig_by_facing import faces_outwards
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 

@@ -70,3 +70,9 @@ def moves(facts: Sequence[InstantFacts]) -> bool:
     """Return whether a usual round shows motion."""
     shares = [one.moving_share for one in facts if one.moving_share is not None]
     return bool(shares) and float(np.median(shares)) > AT_REST
+
+
+def quiet(facts: Sequence[InstantFacts]) -> bool:
+    """Return whether normals are steady enough to be compared with each other."""
+    known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
+    return by_noise_deg(facts) < NOISY_DEG and (not known or float(np.median(known)) < NOISY_DEG)
