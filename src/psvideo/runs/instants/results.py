@@ -21,7 +21,8 @@ from psvideo.plates.used_flashes import used_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.beforehand import check_delivery, pass_doubts, say_instants, world_doubts
-from psvideo.runs.delivery.handover import Finished, write_note, write_previews, write_stage, write_timeline
+from psvideo.runs.delivery.for_programs import write_note, write_stage
+from psvideo.runs.delivery.handover import Finished, write_previews, write_timeline
 from psvideo.runs.instants.job import Found, Job
 from psvideo.runs.instants.pieces import forget_pieces, pieced_together, pieces_begun, write_piece
 from psvideo.runs.instants.plates import nothing_complete
