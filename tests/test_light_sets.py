@@ -14,7 +14,8 @@ from psvideo.cli.app import main
 from psvideo.clip.stills import look_at
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.whole_files import marked_png
-from psvideo.runs.photographs.light_sets import Reading, open_light_sets, read_images
+from psvideo.runs.photographs.light_sets import open_light_sets, read_images
+from psvideo.runs.photographs.opened_sets import Reading
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 

@@ -16,7 +16,8 @@ from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
 from psvideo.runs.calibrate.reading import picture_beside, picture_of_failure, reading_of, rig_out
-from psvideo.runs.photographs.light_sets import Reading, sets_of
+from psvideo.runs.photographs.light_sets import sets_of
+from psvideo.runs.photographs.opened_sets import Reading
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0

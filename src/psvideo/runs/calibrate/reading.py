@@ -11,7 +11,8 @@ from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, check_ending, refuse_existing
 from psvideo.model.rig import Rig
 from psvideo.model.units import listed
-from psvideo.runs.photographs.light_sets import Reading, sets_of
+from psvideo.runs.photographs.light_sets import sets_of
+from psvideo.runs.photographs.opened_sets import Reading
 from psvideo.runs.steps.caller import Caller
 
 MOST_NAMED = 6

@@ -17,7 +17,8 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.light_lists.light_list_reader import pictures_named_by
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Rig
-from psvideo.runs.photographs.light_sets import Reading, open_photographs, sets_of
+from psvideo.runs.photographs.light_sets import open_photographs, sets_of
+from psvideo.runs.photographs.opened_sets import Reading
 from psvideo.runs.steps.caller import Caller
 
 SAME_LENS = 1.01
