@@ -9,26 +9,14 @@ from pathlib import Path
 
 from psvideo.clip import Clip, Kept, Take, keeping_near
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import NoStrobeError, PsvideoError, UsageError
+from psvideo.errors import NoStrobeError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.irradiance.colours import unmixing_of
-from psvideo.model.plan import Plan
-from psvideo.model.rig import LEAST_LIGHTS, Rig
 from psvideo.model.timing import Timing
-from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
-from psvideo.plates.sequence import Round
-from psvideo.report.judge.every_line import judgements
-from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judge.of_frames import exposure_of_frames
-from psvideo.report.judge.of_rows import MOST_UNSEEN
-from psvideo.report.judge.of_validity import first_of_all, validity
-from psvideo.report.judge.typical_error import NOISY_DEG, moves
 from psvideo.report.judgement import Judgement
-from psvideo.report.observe.observed import Observed
-from psvideo.runs.instants.reporting import observing
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
 from psvideo.runs.steps.checked_frames import (
@@ -40,10 +28,8 @@ from psvideo.runs.steps.checked_frames import (
     too_short,
     with_later_holes,
 )
-from psvideo.runs.steps.levels import levels_of
+from psvideo.runs.steps.checked_rounds import lines_of
 from psvideo.runs.steps.saturation import saturation_of
-from psvideo.solve.instants import surfaces
-from psvideo.solve.normals.solving import Solving
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_timing
 
@@ -147,7 +133,7 @@ def judged_take(
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = with_later_holes(timing, clip)
             later = tuple(number for number in later if number > take.numbers[-1])
-            lines = (*_lines_of(take, timing, known, watch=watch), *later_light(take, later))
+            lines = (*lines_of(take, timing, known, watch=watch), *later_light(take, later))
             judged = clip.curve_doubt
             said = {one.sentence for one in (timing.swing, timing.half) if one}
             notes = tuple(note for note in timing.notes if note not in said)
@@ -178,76 +164,12 @@ def _timed(take: Take, first_light: str | None, watch: Watch) -> tuple[Take, Tim
         raise
 
 
-def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) -> tuple[Judgement, ...]:
-    """Judge a take's frames whose flashes are known. Raises PsvideoError where they hold no whole round."""
-    plan = take.clip.plan
-    unmixing = None if known is None else unmixing_of(plan, known, channels=take.clip.channels)
-    apart = take.unmixed(unmixing)
-    rig = known if unmixing is None else unmixing.rig
-    observed, solved = observing(apart, rig), None
-    for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
-        observed.add(one)
-        if rig is not None and not observed.closely.away and one.lights == apart.plan.lights:
-            solved = _look_at_normals(observed, one, apart, rig)
-        del one
-    if not observed.facts:
-        raise PsvideoError(
-            f"{take.clip.path}: its first {len(take.numbers)} frames hold no round in which a light is complete. Film "
-            "longer: a round needs as many frames as it has flashes, and one or two more."
-        )
-    seen = Judgement(subject="strobe", grade="good", found=_strobe_words(plan, timing))
-    numbers = take.clip.numbers
-    partly = len(take.numbers) < len(numbers)
-    take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s if partly else None
-    saturation, levels = saturation_of(take), levels_of(take)
-    judged = judgements(
-        apart.plan,
-        timing,
-        observed,
-        take_s=take_s,
-        curve_doubt=take.clip.curve_doubt,
-        saturation=saturation,
-        levels=levels,
-    )
-    if solved is None or moves(observed.facts):  # plates of what moves are not brought together here
-        return (seen, *judged)
-    return (seen, *judged, *accuracy(solved), *validity(solved, first=first_of_all(judged)))
-
-
-def _look_at_normals(observed: Observed, one: Round, take: Take, rig: Rig) -> Observed | None:
-    """Solve a round and look whether its normals are one surface's, trusted or not, and face outwards at its outline:
-    directions that are mirrored, or lights exchanged, explain the plates as well. Near lights would need the surface's
-    distance for it; noise belongs to no surface, nor does a round that was not seen whole.
-
-    Returns what is seen of that round alone beside its normals, None where it was not solved or is noise.
-    """
-    plan = take.plan
-    lights, whole = rig.select(plan.lights), observed.facts[-1].unseen_share <= MOST_UNSEEN
-    if whole and len(lights) >= LEAST_LIGHTS and all(light.direction is not None for light in lights):
-        surface = next(surfaces(iter([one]), plan, rig, solving=Solving(error=True))).surface
-        if surface.misfit is None or surface.misfit.noise_deg < NOISY_DEG:
-            alone = observing(take, rig)
-            alone.add(one, surface)
-            observed.closely.slopes += alone.closely.slopes
-            observed.closely.away += alone.closely.away
-            observed.closely.outward += alone.closely.outward
-            return alone
-    return None
-
-
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:
     """Return a store for the frames looked at, off the footage's disk; none where they would fill a small one."""
     samples = clip.width_px * clip.height_px * (1 if clip.cfa else clip.channels)
     if 2 * samples * len(window) > MOST_KEPT_BYTES:
         return nullcontext(None)
     return keeping_near(Path(tempfile.gettempdir()) / "psvideo-check")
-
-
-def _strobe_words(plan: Plan, timing: Timing) -> str:
-    flashes = sum(not flash.is_dark for flash in timing.flashes)
-    if plan.mode == "synced":
-        return f"{flashes} flashes, one a frame, as the plan says."
-    return f"The strobe was seen: {flashes} flashes of {len(plan.lights)} lights, as planned."
 
 
 def _unseen(reason: str) -> Judgement:

@@ -2,5 +2,6 @@
 
 ``light_sets`` reads one picture per light, as ``sets_of_files`` and ``sets_of_clip`` have them (``opened_sets``), and
 ``same_scene`` doubts those that differ. ``still_rig`` says where the lights are, ``still_clip`` makes a clip of them,
-``still_doubts`` compares what was assumed with what they show at a ``glance``, and ``rti`` writes a relightable picture.
+``still_doubts`` compares what was assumed with what they show at a ``glance``, and ``rti`` writes a relightable
+picture.
 """
