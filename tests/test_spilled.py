@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute import spilled
 from psvideo.errors import PsvideoError
-from psvideo.formats import exr_files
+from psvideo.formats import exr_files, exr_stream
 from psvideo.model.choices import Compression
 from psvideo.model.rig import Light
 from psvideo.solve.filling.tiles import (
@@ -78,8 +78,8 @@ def test_what_packs_to_next_to_nothing_is_let_go_while_it_is_written(
         read.append(len(parts) == len(planes))
         let_go(*parts)
 
-    monkeypatch.setattr("psvideo.formats.exr_files.let_go", noted)
-    monkeypatch.setattr(exr_files, "LET_GO_EACH_BYTES", planes.nbytes // 9)
+    monkeypatch.setattr("psvideo.formats.exr_stream.let_go", noted)
+    monkeypatch.setattr(exr_stream, "LET_GO_EACH_BYTES", planes.nbytes // 9)
     channels = dict(zip("RGBA", planes, strict=True))
     exr_files.write_exr(tmp_path / "still.exr", channels, half=False, compression=compression)
     assert 4 <= sum(read) <= 18  # none is held for longer than it takes to read a quarter of all

@@ -14,6 +14,9 @@ MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
 STOPS_ROUNDED = 1e-3
 """A wish is kept within this: the duration that is advised has four figures."""
+LOW_HZ, HIGH_HZ = SEIZURE_HZ
+HARMFUL = f"between {LOW_HZ:g} and {HIGH_HZ:g} Hz"
+CARE = "Warn everybody on the set, let no photosensitive person stay, and keep eyes off the lights."
 
 
 def about_the_lights(plan: Plan) -> Iterator[Caution]:
@@ -74,45 +77,48 @@ def _longest_s(limits: Limits) -> float:
 
 def about_seizures(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
     """Warn of rates at which flashing light can harm photosensitive people."""
-    low, high = SEIZURE_HZ
-    care = "Warn everybody on the set, let no photosensitive person stay, and keep eyes off the lights."
-    if low <= figures.flash_rate_hz <= high:
+    yield from _of_the_whole_scene(figures)
+    yield from _of_single_lights(figures)
+    yield from _of_dark_slots(plan, figures)
+
+
+def _of_the_whole_scene(figures: ShootFigures) -> Iterator[Caution]:
+    if LOW_HZ <= figures.flash_rate_hz <= HIGH_HZ:
         yield warning(
             "flicker",
-            f"The whole scene flickers at {figures.flash_rate_hz:.1f} Hz, between {low:g} and {high:g} Hz. {care} A "
-            "frame "
-            f"rate of over {high:g} fps helps.",
+            f"The whole scene flickers at {figures.flash_rate_hz:.1f} Hz, {HARMFUL}. {CARE} A frame rate of over "
+            f"{HIGH_HZ:g} fps helps.",
         )
-    slow = [light for light in figures.lights if low <= light.rate_hz <= high]
+
+
+def _of_single_lights(figures: ShootFigures) -> Iterator[Caution]:
+    slow = [light for light in figures.lights if LOW_HZ <= light.rate_hz <= HIGH_HZ]
     if slow:
         names = "Each light" if len(slow) == len(figures.lights) else ", ".join(light.name for light in slow)
         rates = sorted({f"{light.rate_hz:.1f}" for light in slow})
         yield warning(
             "flicker",
-            f"{names} by itself flashes at {' to '.join(rates[:: max(len(rates) - 1, 1)])} Hz, between {low:g} and "
-            f"{high:g} Hz: "
-            f"a person who sees one light more than the others sees that, though the scene as a whole is lit "
-            f"{figures.flash_rate_hz:.1f} times a second. {care}",
+            f"{names} by itself flashes at {' to '.join(rates[:: max(len(rates) - 1, 1)])} Hz, {HARMFUL}: a person who "
+            "sees one light more than the others sees that, though the scene as a whole is lit "
+            f"{figures.flash_rate_hz:.1f} times a second. {CARE}",
         )
-    if low <= figures.dark_slot_rate_hz <= high:
+
+
+def _of_dark_slots(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
+    often = f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second"
+    if LOW_HZ <= figures.dark_slot_rate_hz <= HIGH_HZ:
         rarer = (
             "A larger `dark_every` makes them rarer, up to what a board holds; two a second are enough, and `marker` "
             "long needs none."
         )
         if plan.dark_code:
             rarer = "A code needs that many: where one camera films, `marker` dark makes do with two a second."
+        yield warning("flicker", f"{often}, a flicker of the whole scene {HARMFUL}. {CARE} {rarer}")
+    elif figures.pattern_hz is not None and figures.pattern_hz <= HIGH_HZ:
         yield warning(
             "flicker",
-            f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, a flicker of the whole scene between "
-            f"{low:g} and "
-            f"{high:g} Hz. {care} {rarer}",
-        )
-    elif figures.pattern_hz is not None and figures.pattern_hz <= high:
-        yield warning(
-            "flicker",
-            f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, but unevenly: their pattern repeats "
-            f"{1 / figures.cycle_s:.3g} times a second, and the whole scene flickers at multiples of that, of which "
-            f"{figures.pattern_hz:.1f} Hz and more lie between {low:g} and {high:g} Hz. {care}",
+            f"{often}, but unevenly: their pattern repeats {1 / figures.cycle_s:.3g} times a second, and the whole "
+            f"scene flickers at multiples of that, of which {figures.pattern_hz:.1f} Hz and more lie {HARMFUL}. {CARE}",
         )
 
 

@@ -19,10 +19,9 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 
 if TYPE_CHECKING:
-    from psvideo.clip.decode.movies.movie import Movie
+    pass
+from psvideo.clip.movie_rate import places_a_frame, rate_warning, varying_rate
 
-RATE_TOLERANCE = 5e-4
-"""A movie's rate counts as the plan's within this share: tighter than 120 for 119.88."""
 PROFILED = ("png", "tiff", "jpeg")
 """Kinds of pictures that name their curve by a profile or in chunks; one that is close to the plan's is not spoken of,
 as profiles name sRGB and a gamma of 2.2 for each other."""
@@ -96,8 +95,8 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
     movie = index_movie(path)
     check_fit(path, movie.header, plan, plan_path)
     encoding, notes = _expanded(_encoding("movie", plan, plan_path), movie.header)
-    rate_warnings = _rate_warning(movie, plan) if movie.rates_hz is None else _varying(path, movie, plan)
-    per_frame = _places_a_frame(movie, plan)
+    rate_warnings = rate_warning(movie, plan) if movie.rates_hz is None else varying_rate(path, movie, plan)
+    per_frame = places_a_frame(movie, plan)
     camera = replace(plan.camera, fps=plan.camera.fps * per_frame)
     return Clip(
         name=path.stem,
@@ -185,49 +184,6 @@ def _curve_doubt(kind: str, plan: Plan, header: Header) -> str:
     transfer = plan.camera.encoding.transfer
     said = "" if kind in RAWS else disagreement(transfer, tagged=header.transfer, kind=kind) or ""
     return said if said and is_another_curve(transfer, header.transfer) else ""
-
-
-def _rate_warning(movie: "Movie", plan: Plan) -> tuple[str, ...]:
-    """Say where a movie plays at another rate than the plan's."""
-    fps = float(plan.camera.fps)
-    if movie.rate_hz is None or abs(movie.rate_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:
-        return ()
-    shot_hz = movie.capture_rate_hz
-    if shot_hz is not None and abs(shot_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:
-        return ()
-    if shot_hz is not None and abs(shot_hz / movie.rate_hz - 1) > RATE_TOLERANCE + movie.rate_error:
-        return (
-            f"the movie says that it was shot at {shot_hz:.6g} frames per second, and the plan says {fps:.6g}, which "
-            "is taken: correct fps in the plan where the movie is right",
-        )
-    return (
-        f"the movie plays at {movie.rate_hz:.6g} frames per second and the plan says {fps:.6g}; the plan's is taken, "
-        "as for high-speed footage that plays slowed down",
-    )
-
-
-def _places_a_frame(movie: "Movie", plan: Plan) -> int:
-    """Return how many of a movie's places there are from one frame of the plan's rate to the next."""
-    if movie.place_rate_hz is None or movie.per_frame == 1:
-        return 1
-    ratio = movie.place_rate_hz / float(plan.camera.fps)
-    whole = max(round(ratio), 1)
-    return whole if abs(ratio / whole - 1) < RATE_TOLERANCE + movie.rate_error else movie.per_frame
-
-
-def _varying(path: Path, movie: "Movie", plan: Plan) -> tuple[str, ...]:
-    """Say that a movie's rate varies. Raises PsvideoError where one flash was fired for each frame."""
-    low, high = movie.rates_hz or (0.0, 0.0)
-    rates = f"varies from {low:.4g} to {high:.4g} frames per second"
-    if plan.mode == "synced":
-        raise PsvideoError(
-            f"{path}: its rate {rates}; the plan is synced, with one flash for each frame, and expects an even rate. "
-            "Record at a constant frame rate."
-        )
-    return (
-        f"the rate {rates}; every frame is taken at the time that the file says, the exposure time for constant. Lock "
-        "exposure and frame rate",
-    )
 
 
 def check_fit(file: Path, header: Header, plan: Plan, plan_path: Path) -> None:

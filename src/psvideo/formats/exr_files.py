@@ -1,33 +1,24 @@
-"""One EXR file: named channels with their attributes, losslessly compressed, whole or not at all.
+"""One EXR file: named channels with their attributes, losslessly compressed, whole or not at all."""
 
-OpenEXR encodes into a file that Python has opened, so that a full disk is an ordinary error: by itself it swallows what
-goes wrong while it closes a file, and leaves a truncated one.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go
-from psvideo.errors import PsvideoError
+from psvideo.formats.exr_stream import write_built
 from psvideo.formats.whole_files import whole_file
 from psvideo.model.choices import USUAL_COMPRESSION, Compression
 
 _INT32_MAX = 2**31 - 1
 AT_ONCE_ROWS = 256
-LET_GO_EACH_BYTES = 1 << 20
-"""What lies in files is let go after this many rows that were looked at, and each time that OpenEXR has read this much:
-what is alike throughout, such as motion vectors of what stands, packs to next to nothing."""
+"""What lies in files is let go after this many rows that were looked at."""
 CHUNK_LINES: dict[Compression, int] = {"zip": 16, "zips": 1, "piz": 32, "rle": 1, "none": 1}
 """So many lines are packed, and written, together."""
-NUMBER_BYTES = 8
-"""A chunk begins with numbers of this size and less."""
 
 _COMPRESSIONS: dict[Compression, object] = {
     "zip": OpenEXR.ZIP_COMPRESSION,
@@ -83,7 +74,9 @@ def write_exr(
         raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
     header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
-        _write(path, beside, lambda: OpenEXR.File(header, planes), tuple(planes.values()), CHUNK_LINES[compression])
+        write_built(
+            path, beside, lambda: OpenEXR.File(header, planes), tuple(planes.values()), CHUNK_LINES[compression]
+        )
 
 
 def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:
@@ -189,54 +182,4 @@ def write_exr_parts(
         every += planes.values()  # which Part replaces by channels of its own
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
-        _write(path, beside, lambda: OpenEXR.File(built), every, CHUNK_LINES[compression])
-
-
-class _Stream:
-    """A file that OpenEXR writes into, ``lines`` of the planes at a time; large ones that it reads go back to the
-    system's cache meanwhile.
-
-    ``fault`` is what went wrong first: OpenEXR swallows what does while it closes a file, where it goes back to write
-    the table of its chunks, and a disk that was full then may have room again when Python closes it.
-    """
-
-    def __init__(self, file: BinaryIO, planes: Sequence[NDArray[np.floating]], lines: int) -> None:
-        self._file, self._planes, self._read = file, planes, 0
-        self._chunk = lines * sum(plane.shape[1] * plane.itemsize for plane in planes)
-        self.fault: OSError | None = None
-
-    def write(self, data: bytes) -> int:
-        self._read += self._chunk if len(data) > NUMBER_BYTES else 0
-        if self._read > LET_GO_EACH_BYTES:
-            let_go(*self._planes)
-            self._read = 0
-        return self._noted(lambda: self._file.write(data))
-
-    def seek(self, place: int, whence: int = 0) -> int:
-        return self._noted(lambda: self._file.seek(place, whence))
-
-    def tell(self) -> int:
-        return self._noted(self._file.tell)
-
-    def _noted(self, do: Callable[[], int]) -> int:
-        try:
-            return do()
-        except OSError as fault:
-            self.fault = self.fault or fault
-            raise
-
-
-def _write(
-    path: Path, beside: Path, build: Callable[[], "OpenEXR.File"], planes: Sequence[NDArray[np.floating]], lines: int
-) -> None:
-    """Write what is built of ``planes``, so many ``lines`` at a time, to the file ``beside``, which stands for ``path``
-    until it is whole."""
-    try:
-        with beside.open("wb") as file:
-            stream = _Stream(file, planes, lines)
-            build().write(stream)
-            if stream.fault is not None:
-                raise stream.fault
-            let_go(*planes)
-    except RuntimeError as fault:  # what OpenEXR raises for all its faults
-        raise PsvideoError(f"{path}: OpenEXR cannot encode this picture: {fault}") from fault
+        write_built(path, beside, lambda: OpenEXR.File(built), every, CHUNK_LINES[compression])

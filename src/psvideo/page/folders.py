@@ -2,22 +2,20 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from psvideo.clip.decode.exr import contents, read_halves
-from psvideo.clip.folder import MOVIES, number_of
+from psvideo.clip.folder import MOVIES
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import read_json
 from psvideo.formats.timing_json import read_timing, timing_record
 from psvideo.inspect.about_output import is_plates, is_results, solved_takes_in
-from psvideo.model.quantities import QUANTITIES, Quantity
+from psvideo.model.quantities import QUANTITIES
 from psvideo.model.units import counted
 from psvideo.page.file_times import file_times_s
 from psvideo.page.footage import show_of_clip, with_clip
-from psvideo.page.picture import Look, PagePicture, shown
-from psvideo.page.show import Show, ShownSequence
+from psvideo.page.sequence_files import files_in, first_header, rate_of, sequence_of, size_and_rate
+from psvideo.page.show import Show
 
 FLASHES = "flashes"
 """Where split writes every flash by itself, beside the plates."""
@@ -74,12 +72,12 @@ def _results(path: Path) -> Show:
     known = [
         row
         for row in QUANTITIES.values()
-        if row.written != "plates" and row.shown != "never" and _files(path / row.name)
+        if row.written != "plates" and row.shown != "never" and files_in(path / row.name)
     ]
-    first = _files(path / known[0].name)
-    times_s = file_times_s(first, _rate(_first_header(first)))
-    sequences = [_sequence(path / row.name, row, like=(tuple(sorted(first)), times_s)) for row in known]
-    width_px, height_px, fps = _look(path / known[0].name)
+    first = files_in(path / known[0].name)
+    times_s = file_times_s(first, rate_of(first_header(first)))
+    sequences = [sequence_of(path / row.name, row, like=(tuple(sorted(first)), times_s)) for row in known]
+    width_px, height_px, fps = size_and_rate(path / known[0].name)
     report = _report(path / "report.json")
     return Show(
         name=path.resolve().name if not report else str(report.get("clip", path.name)),
@@ -97,7 +95,7 @@ def _results(path: Path) -> Show:
 
 
 def _plates(path: Path) -> Show:
-    folders = sorted(entry for entry in path.iterdir() if entry.is_dir() and _files(entry))
+    folders = sorted(entry for entry in path.iterdir() if entry.is_dir() and files_in(entry))
     folders = [folder for folder in folders if folder.name != FLASHES]
     folders.sort(key=lambda folder: folder.name == AMBIENT.name)
     if not folders:
@@ -106,10 +104,10 @@ def _plates(path: Path) -> Show:
             f"split writes them. Run it again, or bring them back beside {FLASHES}/."
         )
     sequences = [
-        replace(_sequence(folder, PLATE), label=folder.name, group="Plates", id=f"plate-{place}", family="camera")
+        replace(sequence_of(folder, PLATE), label=folder.name, group="Plates", id=f"plate-{place}", family="camera")
         for place, folder in enumerate(folders)
     ]
-    width_px, height_px, fps = _look(folders[0])
+    width_px, height_px, fps = size_and_rate(folders[0])
     return Show(
         name=path.resolve().name,
         kind="plates",
@@ -119,67 +117,6 @@ def _plates(path: Path) -> Show:
         sequences=tuple(sequences),
         timing=_timing_of(path / "timing.json"),
     )
-
-
-Instants = tuple[tuple[int, ...], tuple[float, ...]]
-"""Numbers of pictures, and their times in seconds."""
-
-
-def _sequence(folder: Path, quantity: Quantity, *, like: Instants = ((), ())) -> ShownSequence:
-    """Return a folder's pictures; where they have the numbers of ``like``, also its times, as of one instant."""
-    files = _files(folder)
-    head = _first_header(files)
-    numbers = tuple(sorted(files))
-    return ShownSequence(
-        id=folder.name,
-        label=quantity.label,
-        kind=quantity.shown,
-        group="Results",
-        timeline="rounds",
-        numbers=numbers,
-        times_s=like[1] if numbers == like[0] else file_times_s(files, _rate(head)),
-        read=partial(_read, files, quantity),
-        unit=quantity.unit,
-        from_zero=quantity.from_zero,
-        hatched=quantity.hatched,
-        y=str(head.get("psvideo:y", "up")),
-        space=str(head.get("psvideo:space", "camera")),
-    )
-
-
-def _read(files: Mapping[int, Path], quantity: Quantity, number: int, look: Look) -> PagePicture:
-    found = read_halves(files[number])
-    pixels = shown(found.planes, look, directions=quantity.shown == "normals", full=quantity.digits == "float")
-    facts: dict[str, object] = {"time_s": found.attributes.get("psvideo:time_s")}
-    if (matrix := found.attributes.get("psvideo:camera_to_world")) is not None:
-        facts["camera_to_world"] = [float(word) for word in str(matrix).split()]
-    return PagePicture(pixels=pixels, facts=facts)
-
-
-def _files(folder: Path) -> dict[int, Path]:
-    """Return a folder's EXR files by number."""
-    found = ((number_of(file), file) for file in sorted(folder.glob("[!.]*.exr")))
-    return {number: file for number, file in found if number is not None}
-
-
-def _first_header(files: Mapping[int, Path]) -> Mapping[str, str | int | float | None]:
-    """Return the attributes of the first file whose header can be read. Raises PsvideoError where there is none."""
-    fault: PsvideoError | None = None
-    for number in sorted(files):
-        try:
-            return contents(files[number])[1]
-        except PsvideoError as error:
-            fault = fault or error
-    raise fault or PsvideoError("a folder without EXR files has no header")
-
-
-def _look(folder: Path) -> tuple[int, int, float]:
-    head = _first_header(_files(folder))
-    return int(head["width_px"] or 0), int(head["height_px"] or 0), _rate(head)
-
-
-def _rate(head: Mapping[str, str | int | float | None]) -> float:
-    return float(Fraction(str(head.get("framesPerSecond", "24"))))
 
 
 def _timing_of(path: Path) -> partial[Mapping[str, object]] | None:

@@ -26,7 +26,8 @@ from psvideo.runs.delivery.handover import Finished, write_previews, write_timel
 from psvideo.runs.instants.job import Found, Job
 from psvideo.runs.instants.pieces import forget_pieces, pieced_together, pieces_begun, write_piece
 from psvideo.runs.instants.plates import nothing_complete
-from psvideo.runs.instants.reporting import Solved, run_report, write_report
+from psvideo.runs.instants.reporting import run_report, write_report
+from psvideo.runs.instants.shot_and_settings import Solved
 from psvideo.runs.instants.solving import knowing_subject, write_instants
 from psvideo.runs.steps.output import Output, begun_by, folder_of
 from psvideo.solve.depth import scale_note
