@@ -10,7 +10,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go
-from psvideo.formats.exr_stream import write_built
+from psvideo.formats.exr_stream import write_streamed
 from psvideo.formats.whole_files import whole_file
 from psvideo.model.choices import USUAL_COMPRESSION, Compression
 
@@ -74,9 +74,8 @@ def write_exr(
         raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
     header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
-        write_built(
-            path, beside, lambda: OpenEXR.File(header, planes), tuple(planes.values()), CHUNK_LINES[compression]
-        )
+        stored, lines = tuple(planes.values()), CHUNK_LINES[compression]
+        write_streamed(path, beside, lambda stream: OpenEXR.File(header, planes).write(stream), stored, lines)
 
 
 def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:
@@ -182,4 +181,5 @@ def write_exr_parts(
         every += planes.values()  # which Part replaces by channels of its own
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
-        write_built(path, beside, lambda: OpenEXR.File(built), every, CHUNK_LINES[compression])
+        lines = CHUNK_LINES[compression]
+        write_streamed(path, beside, lambda stream: OpenEXR.File(built).write(stream), every, lines)

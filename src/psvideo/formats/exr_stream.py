@@ -5,16 +5,13 @@ By itself OpenEXR swallows what goes wrong while it closes a file, and leaves a 
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go
 from psvideo.errors import PsvideoError
-
-if TYPE_CHECKING:
-    import OpenEXR
 
 LET_GO_EACH_BYTES = 1 << 20
 """What lies in files is let go each time that OpenEXR has read this much of it: what is alike throughout, such as
@@ -23,7 +20,7 @@ NUMBER_BYTES = 8
 """A chunk begins with numbers of this size and less."""
 
 
-class _Stream:
+class ExrStream:
     """A file that OpenEXR writes into, ``lines`` of the planes at a time; large ones that it reads go back to the
     system's cache meanwhile.
 
@@ -37,6 +34,7 @@ class _Stream:
         self.fault: OSError | None = None
 
     def write(self, data: bytes) -> int:
+        """Write bytes, and let go of what was read for them."""
         self._read += self._chunk if len(data) > NUMBER_BYTES else 0
         if self._read > LET_GO_EACH_BYTES:
             let_go(*self._planes)
@@ -44,9 +42,11 @@ class _Stream:
         return self._noted(lambda: self._file.write(data))
 
     def seek(self, place: int, whence: int = 0) -> int:
+        """Go to a place in the file."""
         return self._noted(lambda: self._file.seek(place, whence))
 
     def tell(self) -> int:
+        """Return the place in the file."""
         return self._noted(self._file.tell)
 
     def _noted(self, do: Callable[[], int]) -> int:
@@ -57,15 +57,19 @@ class _Stream:
             raise
 
 
-def write_built(
-    path: Path, beside: Path, build: Callable[[], "OpenEXR.File"], planes: Sequence[NDArray[np.floating]], lines: int
+def write_streamed(
+    path: Path,
+    beside: Path,
+    write: Callable[[ExrStream], object],
+    planes: Sequence[NDArray[np.floating]],
+    lines: int,
 ) -> None:
-    """Write what is built of ``planes``, so many ``lines`` at a time, to the file ``beside``, which stands for ``path``
-    until it is whole."""
+    """Have OpenEXR ``write`` what it built of ``planes``, so many ``lines`` at a time, to the file ``beside``, which
+    stands for ``path`` until it is whole."""
     try:
         with beside.open("wb") as file:
-            stream = _Stream(file, planes, lines)
-            build().write(stream)
+            stream = ExrStream(file, planes, lines)
+            write(stream)
             if stream.fault is not None:
                 raise stream.fault
             let_go(*planes)

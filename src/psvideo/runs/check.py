@@ -17,6 +17,7 @@ from psvideo.model.timing import Timing
 from psvideo.plates.naming import named_by_rig
 from psvideo.report.judge.of_frames import exposure_of_frames
 from psvideo.report.judgement import Judgement
+from psvideo.runs.instants.checked_rounds import lines_of
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
 from psvideo.runs.steps.checked_frames import (
@@ -28,7 +29,6 @@ from psvideo.runs.steps.checked_frames import (
     too_short,
     with_later_holes,
 )
-from psvideo.runs.steps.checked_rounds import lines_of
 from psvideo.runs.steps.saturation import saturation_of
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_timing

@@ -4,5 +4,5 @@
 instants by ``solving``, which asks ``depths`` for depth. ``pieces`` cuts a run into ranges that are solved apart,
 ``piece_frames`` says what a range needs beside its own frames, by ``succession``, the order of instants, rounds and
 frames, and ``piece_notes`` keeps on disk what a piece found. ``reporting`` writes the report once all instants are
-there, with what ``shot_and_settings`` says of the shot.
+there, with what ``shot_and_settings`` says of the shot; ``checked_rounds`` is what a check makes of a few rounds.
 """
