@@ -9,6 +9,10 @@ DECISIVE = ("strobe", "curve", "timing", "order", "rig")
 """Where one of these is doubtful, all normals may be wrong, and not only parts of them."""
 
 
+NAMED = 4
+"""This many lights or rounds are named one by one; of more, only how many."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
     """One line of a judgement. ``subject`` is a word such as ``exposure``; ``found`` a sentence with its figures;

@@ -9,8 +9,7 @@ from psvideo.clip.transfer import records_scene
 from psvideo.model.camera import Encoding
 from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.units import listed
-from psvideo.report.judge.of_lamps import NAMED
-from psvideo.report.judgement import Judgement
+from psvideo.report.judgement import NAMED, Judgement
 from psvideo.report.observe.against_noise import AgainstNoise, usual
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE, Levels
 from psvideo.report.observe.observed import Observed

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 
 from psvideo.model.units import listed
-from psvideo.report.judge.of_lamps import NAMED, weaker_than_rig
 from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.rig_by_facing import facing_away, facing_inwards
 from psvideo.report.judge.rig_by_lean import normals_lean
@@ -17,7 +16,8 @@ from psvideo.report.judge.rig_by_plates import (
 )
 from psvideo.report.judge.rig_by_slopes import lights_crossed, surface_shines
 from psvideo.report.judge.rig_of_three import three_lights
-from psvideo.report.judgement import Judgement
+from psvideo.report.judge.weak_lamps import weaker_than_rig
+from psvideo.report.judgement import NAMED, Judgement
 from psvideo.report.observe.observed import Observed
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from psvideo.model.units import listed
-from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.typical_error import COMMON_DEG
-from psvideo.report.judgement import Grade, Judgement
+from psvideo.report.judgement import NAMED, Grade, Judgement
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 
 MISFIT, LOST_MISFIT = 0.135, 0.25

@@ -1,4 +1,4 @@
-"""The whole of ``psvideo calibrate colours``."""
+"""The whole of ``psvideo calibrate colours``: pictures of a white card in, the rig with every light's colour out."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The whole of ``psvideo calibrate flat-field``."""
+"""The whole of ``psvideo calibrate flat-field``: a white card in; the rig with intensities out, and a falloff map."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The whole of ``psvideo calibrate guess``."""
+"""The whole of ``psvideo calibrate guess``: pictures of any rounded subject in, a rig of guessed directions out."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The whole of ``psvideo calibrate intensities``."""
+"""The whole of ``psvideo calibrate intensities``: any matte scene in, the rig with relative intensities out."""
 
 from dataclasses import dataclass
 from pathlib import Path

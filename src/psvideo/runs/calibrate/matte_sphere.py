@@ -1,4 +1,4 @@
-"""The whole of ``psvideo calibrate matte-sphere``."""
+"""The whole of ``psvideo calibrate matte-sphere``: pictures of a matte sphere in, a rig file and a picture out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

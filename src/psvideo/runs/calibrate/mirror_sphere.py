@@ -1,4 +1,4 @@
-"""The whole of ``psvideo calibrate mirror-sphere``."""
+"""The whole of ``psvideo calibrate mirror-sphere``: pictures of mirror spheres in, a rig file and a picture out."""
 
 from collections.abc import Sequence
 from dataclasses import replace
