@@ -1,5 +1,6 @@
 """Options and photographs that cannot be meant, and what the command and ``info`` say of a folder."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from still_pictures import LIGHTS, NAMES, SIZE, chunk, facing, listed, lit, phot
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
+from psvideo.formats.whole_files import whole_file
 from psvideo.inspect.describe import describe
 
 
@@ -93,6 +95,27 @@ def test_what_cannot_go_together_is_said_in_one_paragraph_and_nothing_is_written
         assert part in str(fault.value)
     assert "\n" not in str(fault.value)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_what_ends_a_run_of_photographs_leaves_nothing_and_names_no_option_that_it_does_not_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], stopped: bool
+) -> None:
+    """At the end normals, albedo and validity are whole, but nothing goes on from them."""
+    folder, lights = photographs(tmp_path / "photos", lit()), listed(tmp_path / "lights.lp")
+
+    def end(*_: object) -> None:
+        if stopped:
+            raise KeyboardInterrupt
+        with whole_file(next(tmp_path.glob(".out.partial")) / "rti"):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("psvideo.runs.stills.write_setup", lambda *_, **__: end())
+    assert main(["stills", str(folder), "--lights", str(lights), "-o", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert "No space left on device" in said or stopped
+    assert "--resume" not in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lights.lp", "photos"]
 
 
 def test_the_command_says_what_it_assumed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -36,31 +36,32 @@ KEPT = "What was finished is kept; the same command with `resume` goes on."
 
 @contextlib.contextmanager
 def whole_folder(
-    path: Path, *, mark: str, force: bool = False, resume: bool = False, settings: str = ""
+    path: Path, *, mark: str, force: bool = False, resume: bool = False, settings: str = "", kept: bool = True
 ) -> Iterator[Path]:
     """Give a folder to write into; when the block ends well it gets the name ``path``, replacing what ``force`` allows.
 
     ``mark`` is the file by which a folder of this kind is known. A block that fails leaves nothing under ``path``; what
     it had finished stays in the hidden folder for ``resume``, which goes on only with the same ``settings``, begins
-    where nothing was begun, and is removed by the next run that does not resume. Raises UsageError where the output
-    exists or was begun with other settings, AllDoneError where ``resume`` finds it finished; PsvideoError where the
-    folder cannot be written.
+    where nothing was begun, and is removed by the next run that does not resume. Without ``kept``, of runs that
+    nothing resumes, it goes at once. Raises UsageError where the output exists or was begun with other settings,
+    AllDoneError where ``resume`` finds it finished; PsvideoError where the folder cannot be written.
     """
     refuse_folder(path, mark=mark, force=force, resume=resume, settings=settings)
     path = path.resolve()
     beside = unfinished_folder_of(path)
-    with _said_where(path, resumable=bool(settings)):
+    resumable = kept and bool(settings)
+    with _said_where(path, resumable=resumable):
         beside.mkdir(parents=True, exist_ok=True)
-        with _held(beside, path):
+        with _held(beside, path), contextlib.nullcontext() if kept else _removed_on_fault(beside):
             for left in [*(beside.rglob(UNFINISHED) if resume else beside.iterdir())]:
                 _remove(left)
             for old in path.parent.glob(_old_name(path, "*")) if path.exists() else ():
                 shutil.rmtree(old, ignore_errors=True)
             if settings:
                 write_text(beside / SETTINGS, settings)
-            with _still_there(beside, path, settings), _kept_noted(beside, resumable=bool(settings)):
+            with _still_there(beside, path, settings), _kept_noted(beside, resumable=resumable):
                 yield beside
-            refuse_what_came(path, resumable=bool(settings))
+            refuse_what_came(path, resumable=resumable)
             if mark != PLAN_FILE:  # footage is never replaced, and a full disk costs none of it
                 note_written(beside)
             _replace(beside, path)
@@ -90,6 +91,15 @@ def forget_begun(path: Path) -> None:
     if (beside := unfinished_folder_of(path)).is_dir():
         with _said_where(path), _held(beside, path):
             shutil.rmtree(beside)
+
+
+@contextlib.contextmanager
+def _removed_on_fault(beside: Path) -> Iterator[None]:
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(beside, ignore_errors=True)
+        raise
 
 
 @contextlib.contextmanager

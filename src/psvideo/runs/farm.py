@@ -68,7 +68,7 @@ def farm(
     )
     lines = job_lines(job)
     if folder is not None:
-        with whole_folder(folder, mark=TEMPLATE_FILE, force=force) as place:
+        with whole_folder(folder, mark=TEMPLATE_FILE, force=force, kept=False) as place:
             values = job_values(job)
             listed = {"parameterValues": [{"name": name, "value": value} for name, value in values.items()]}
             files = {TEMPLATE_FILE: job_template(job), VALUES_FILE: values, SUBMITTED_FILE: listed}

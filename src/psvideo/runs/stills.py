@@ -103,7 +103,7 @@ def stills(
     ['key', 'left', 'top']
     """
     path = path_of("folder", folder)
-    output = Output(folder=path_of("out", out), force=force, caller=caller)
+    output = Output(folder=path_of("out", out), force=force, caller=caller, kept=False)
     output.check()
     check_transfer(transfer)
     if lights is not None and not sphere:

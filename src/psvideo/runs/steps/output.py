@@ -29,7 +29,8 @@ MARK = "timing.json"
 class Output:
     """Where a run writes, what it may do there, and who called it.
 
-    ``settings`` is a digest of what the run is given: a stopped run is resumed only under the same.
+    ``settings`` is a digest of what the run is given: a stopped run is resumed only under the same, and where nothing
+    resumes it, as of photographs, nothing is ``kept``.
     """
 
     folder: Path
@@ -38,6 +39,7 @@ class Output:
     start_number: int = FIRST_NUMBER
     caller: Caller = PYTHON
     settings: str = ""
+    kept: bool = True
 
     def check(self) -> None:
         """Raise UsageError where the folder exists and may not be replaced, before any work is done."""
@@ -66,7 +68,8 @@ def _identity(take: Take) -> list[object]:
 
 def folder_of(output: Output) -> AbstractContextManager[Path]:
     """Return the block that writes the folder whole or not at all."""
-    return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=output.settings)
+    asked = {"force": output.force, "resume": output.resume, "kept": output.kept}
+    return whole_folder(output.folder, mark=MARK, settings=output.settings, **asked)
 
 
 def begun_by(output: Output) -> AbstractContextManager[Path]:
