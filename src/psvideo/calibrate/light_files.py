@@ -9,8 +9,8 @@ from psvideo.calibrate.picture_sets import LightFiles
 from psvideo.calibrate.still_names import AMBIENT_NAMES, ROOM_NAMES, sorted_by_name
 from psvideo.clip.folder import KINDS, USUAL_KINDS, number_of, unread_in
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.clip_layout import FRAMES, PLAN_FILE
 from psvideo.formats.contract import check_light_name
-from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
 from psvideo.formats.timing_json import read_timing
 from psvideo.formats.whole_files import is_drawn
 

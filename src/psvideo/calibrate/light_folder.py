@@ -15,7 +15,7 @@ from psvideo.calibrate.light_files import (
 from psvideo.calibrate.picture_sets import LightFiles
 from psvideo.calibrate.still_names import AMBIENT_NAMES, ROOM_NAMES, sorted_by_name
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import FRAMES
+from psvideo.formats.clip_layout import FRAMES
 from psvideo.model.units import listed
 
 LISTED = 4

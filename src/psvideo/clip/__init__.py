@@ -6,8 +6,8 @@ colour of a mosaic.
 
 - records: ``record`` (a clip), ``take`` (a clip and the frames that are used)
 - finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves),
-  ``stated_curve`` (by which curve they code light), ``filters`` (whether they are a mosaic) and ``movie_rate`` (how a
-  movie's rate goes with the plan's)
+  ``profile_curve`` and ``stated_curve`` (by which curve they code light), ``filters`` (whether they are a mosaic) and
+  ``movie_rate`` (how a movie's rate goes with the plan's)
 - reading: ``reading``, ``transfer`` and ``linear`` (from codes to light), ``tagged_curve`` (whether files say that they
   were coded otherwise), ``in_file`` and ``kept`` (codes that are not in memory)
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.clip_layout import FRAMES
 from psvideo.formats.paths import check_text
-from psvideo.formats.plan_toml import FRAMES
 
 KINDS = {
     ".png": "png",

@@ -14,7 +14,8 @@ from psvideo.clip.stated import stated_by
 from psvideo.clip.tagged_curve import disagreement, is_another_curve
 from psvideo.clip.transfer import DISPLAYED, find_curve
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import FRAMES, find_plan, read_plan
+from psvideo.formats.clip_layout import FRAMES, find_plan
+from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 

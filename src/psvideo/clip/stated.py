@@ -1,12 +1,9 @@
 """What a photograph's file says of itself beside its pixels: how it was exposed, how it lies, and its colour's curve.
 
-EXIF (CIPA DC-008) is read from JPEG, TIFF, PNG, DNG and raw files; the curve from an ICC profile (ICC.1, the red or
-grey channel's ``TRC``) or from PNG's own chunks (``cICP``, ``sRGB``, ``gAMA``).
+EXIF (CIPA DC-008) is read from JPEG, TIFF, PNG, DNG and raw files; the curve by ``profile_curve``.
 """
 
 import contextlib
-import io
-import struct
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,18 +15,15 @@ from PIL import ExifTags, Image, UnidentifiedImageError
 
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS
-from psvideo.clip.transfer import BY_H273, DISPLAYED, find_curve, to_light
+from psvideo.clip.profile_curve import above_0, coded_curve, curve_named_in
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 from psvideo.model.arrays import Doubles
 from psvideo.model.turn import EXIF, UPRIGHT, Turn
 
-LIKE = 0.02
-"""A profile's curve is one of those that have a name where it is nowhere further from it than this share of white."""
 WIDTH_35_MM = 36.0
 OTHER_EXPOSURE = 1.05
 """Exposures that differ by this factor were not meant to be the same."""
-SIGNALS = np.linspace(0, 1, 65)
 SEVERAL_PICTURES = ("tiff", "dng", "raw")
 """Kinds whose files may hold a small picture before the one that is decoded."""
 
@@ -69,13 +63,13 @@ def stated_by(path: Path) -> Stated:
         longer_px, info, exif = _opened(path)
         found = replace(found, longer_px=longer_px)
         with contextlib.suppress(Exception):
-            transfer, by = _coded_curve(path) or _curve(info)
+            transfer, by = coded_curve(path) or curve_named_in(info)
             found = replace(found, transfer=transfer, by=by)
-        found = replace(found, turn=EXIF.get(int(_above_0(exif.get(ExifTags.Base.Orientation)) or 1), UPRIGHT))
+        found = replace(found, turn=EXIF.get(int(above_0(exif.get(ExifTags.Base.Orientation)) or 1), UPRIGHT))
         found = replace(
             found,
             **_exposure(exif),
-            focal_widths=_above_0(exif.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
+            focal_widths=above_0(exif.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
             camera=_camera(exif),
         )
     return found if found.exposure is not None else _exposed_by_libraw(path, found)
@@ -139,13 +133,6 @@ def are_uneven(exposures: Doubles) -> bool:
     return bool(exposures.max() >= OTHER_EXPOSURE * exposures.min())
 
 
-def _above_0(value: Any, factor: float = 1.0) -> float | None:
-    with contextlib.suppress(TypeError, ValueError, ZeroDivisionError):
-        number = float(value) * factor
-        return number if 0 < number < np.inf else None
-    return None
-
-
 def _camera(taken: dict[int, Any]) -> str:
     make, model = (str(taken.get(tag, "")).strip(" \0") for tag in (ExifTags.Base.Make, ExifTags.Base.Model))
     return model if make and model.startswith(make.split()[0]) else f"{make} {model}".strip()
@@ -154,83 +141,11 @@ def _camera(taken: dict[int, Any]) -> str:
 def _exposure(taken: dict[int, Any]) -> dict[str, Any]:
     """Return ``exposure`` and ``exposed_by`` of a Stated by EXIF's tags."""
     iso = taken.get(ExifTags.Base.ISOSpeedRatings)
-    stop = _above_0(taken.get(ExifTags.Base.FNumber))
+    stop = above_0(taken.get(ExifTags.Base.FNumber))
     factors = {
-        "time": _above_0(taken.get(ExifTags.Base.ExposureTime)),
+        "time": above_0(taken.get(ExifTags.Base.ExposureTime)),
         "aperture": None if stop is None else 1 / stop**2,
-        "ISO": _above_0(iso[0] if isinstance(iso, tuple) and iso else iso),
+        "ISO": above_0(iso[0] if isinstance(iso, tuple) and iso else iso),
     }
     known = {name: factor for name, factor in factors.items() if factor is not None}
     return {"exposure": float(np.prod(list(known.values()))), "exposed_by": tuple(known)} if "time" in known else {}
-
-
-def _coded_curve(path: Path) -> tuple[str, str] | None:
-    """Return the curve that a PNG's ``cICP`` chunk names, which goes before all else (PNG 3, 11.3.2.6)."""
-    with path.open("rb") as file:
-        if file.read(8) != b"\x89PNG\r\n\x1a\n":
-            return None
-        while len(head := file.read(8)) == 8:
-            size, name = struct.unpack(">I4s", head)
-            if name == b"cICP" and size == 4:
-                return BY_H273.get(file.read(4)[1], "unknown"), "its cICP chunk"
-            if name in (b"IDAT", b"IEND"):
-                return None
-            file.seek(size + 4, 1)
-    return None
-
-
-def _curve(info: dict[Any, Any]) -> tuple[str | None, str]:
-    """Return the name of the curve that a file names, and what names it."""
-    profile = info.get("icc_profile")
-    if profile:
-        light = _profile_light(bytes(profile))
-        return (None, "") if light is None else (_named(light), "its ICC profile")
-    if "srgb" in info:
-        return "srgb", "its sRGB chunk"
-    if gamma := _above_0(info.get("gamma")):
-        return _named(SIGNALS ** (1 / gamma)), f"its gAMA chunk ({gamma:.4g})"
-    return None, ""
-
-
-def _named(light: Doubles) -> str:
-    """Return the known curve that makes this light of SIGNALS, or "unknown"."""
-    away = {name: float(np.abs(to_light(find_curve(name), SIGNALS) - light).max()) for name in DISPLAYED[:6]}
-    best = min(away, key=lambda name: away[name])
-    return best if away[best] < LIKE else "unknown"
-
-
-def _profile_light(profile: bytes) -> Doubles | None:
-    """Return the light that an ICC profile's curve makes of SIGNALS; None where it has no single curve."""
-    with contextlib.suppress(struct.error, ValueError, IndexError):
-        tags = io.BytesIO(profile[128:])
-        (count,) = struct.unpack(">I", tags.read(4))
-        for _ in range(min(count, 100)):
-            name, offset, size = struct.unpack(">4sII", tags.read(12))
-            if name in (b"rTRC", b"kTRC"):
-                return _tone(profile[offset : offset + size])
-    return None
-
-
-def _tone(tag: bytes) -> Doubles | None:
-    """Return the light of a ``curv`` or ``para`` tag (ICC.1:2010, 10.5 and 10.15)."""
-    kind = tag[:4]
-    if kind == b"curv":
-        (count,) = struct.unpack(">I", tag[8:12])
-        if count == 0:
-            return SIGNALS.copy()
-        entries = np.frombuffer(tag[12 : 12 + 2 * count], ">u2").astype(np.float64)
-        if count == 1:
-            return np.asarray(SIGNALS ** (entries[0] / 256))
-        return np.asarray(np.interp(SIGNALS, np.linspace(0, 1, count), entries / 65535))
-    if kind != b"para":
-        return None
-    (function,) = struct.unpack(">H", tag[8:10])
-    count = (1, 3, 4, 5, 7)[function]
-    g, *rest = (value / 65536 for value in struct.unpack(f">{count}i", tag[12 : 12 + 4 * count]))
-    a, b, c, d, e, f = (rest + [0.0] * 6)[:6] if rest else (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    power = np.maximum(a * SIGNALS + b, 0) ** g
-    if function == 0:
-        return np.asarray(power)
-    if function in (1, 2):
-        return np.asarray(np.where(-b / a <= SIGNALS, power + c, c))
-    return np.asarray(np.where(d <= SIGNALS, power + e, c * SIGNALS + f))

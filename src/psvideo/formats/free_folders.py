@@ -7,7 +7,7 @@ other inputs neither goes on in it nor is taken for done.
 from pathlib import Path
 
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
-from psvideo.formats.plan_toml import PLAN_FILE
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.formats.written_files import refuse_others
 

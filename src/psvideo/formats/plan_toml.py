@@ -7,7 +7,6 @@ from typing import Annotated, Literal, Self
 import tomlkit
 from pydantic import Field, field_validator, model_validator
 
-from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
 from psvideo.formats.frame_rates import parse_fps
 from psvideo.formats.paths import path_of
@@ -230,25 +229,3 @@ def _camera_table(camera: Camera) -> tomlkit.items.Table:
         if value is not None:
             table[key] = value
     return table
-
-
-FRAMES, PLAN_FILE = "frames", "plan.toml"
-"""What may hold a clip's frames in its folder, and what its plan is called there."""
-
-
-def find_plan(path: Path, *, given: Path | None = None) -> Path:
-    """Return the plan that belongs to a clip: the one given, else plan.toml in the folder or beside the movie."""
-    if given is not None:
-        return given
-    folder = path if path.is_dir() else path.parent
-    plan = folder / PLAN_FILE
-    if not plan.is_file() and folder.name == FRAMES and (folder.parent / PLAN_FILE).is_file():
-        raise PsvideoError(f"{folder}: there is no plan.toml here, but one folder up. Name the clip: {folder.parent}")
-    if not plan.is_file():
-        raise PsvideoError(
-            f"{path}: there is no plan.toml {'here' if path.is_dir() else 'beside it'}. Put the plan that the strobe "
-            "played beside the footage, "
-            "name it with `plan`, or write one with psvideo capture-plan. Photographs, one per light, need none: "
-            "psvideo stills."
-        )
-    return plan

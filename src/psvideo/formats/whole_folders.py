@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.free_folders import (
     SETTINGS,
     UNFINISHED,
@@ -21,7 +22,6 @@ from psvideo.formats.free_folders import (
     refuse_what_came,
     unfinished_folder_of,
 )
-from psvideo.formats.plan_toml import PLAN_FILE
 from psvideo.formats.whole_files import not_written, write_text
 from psvideo.formats.written_files import note_written
 

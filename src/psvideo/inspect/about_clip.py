@@ -10,7 +10,7 @@ from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import looks, read_frames
 from psvideo.clip.record import Clip
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import find_plan
+from psvideo.formats.clip_layout import find_plan
 from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.inspect.about_movie import movie_findings
 from psvideo.inspect.about_photographs import photograph_findings

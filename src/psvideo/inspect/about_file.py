@@ -11,8 +11,9 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS
 from psvideo.clip.reading import looks
 from psvideo.errors import PsvideoError
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.contract import read_text
-from psvideo.formats.plan_toml import PLAN_FILE, read_plan
+from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import read_timing

@@ -8,7 +8,7 @@ from pathlib import Path
 from psvideo.clip.decode import exr
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import PLAN_FILE
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.quantities import ALWAYS, QUANTITIES

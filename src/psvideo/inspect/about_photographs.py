@@ -9,7 +9,7 @@ from psvideo.clip.reading import looks
 from psvideo.clip.stated import says_as
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import PLAN_FILE
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.inspect.findings import Finding, ok, warn
 from psvideo.model.units import counted, listed
 

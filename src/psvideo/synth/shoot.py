@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.errors import UsageError
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.paths import path_of
-from psvideo.formats.plan_toml import PLAN_FILE, format_plan
+from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import not_written, refuse_existing

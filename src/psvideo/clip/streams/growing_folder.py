@@ -12,7 +12,7 @@ from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture, Frame, PictureInFile
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import FRAMES
+from psvideo.formats.clip_layout import FRAMES
 from psvideo.model.camera import Camera
 
 LOOK_S = 0.004

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.sequences.code_files import write_codes
+from psvideo.formats.clip_layout import FRAMES, PLAN_FILE
 from psvideo.formats.free_folders import unfinished_folder_of
-from psvideo.formats.plan_toml import FRAMES, PLAN_FILE
 from psvideo.formats.whole_folders import forget_begun, whole_folder
 from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.live.incoming.source import LiveSource

@@ -6,7 +6,8 @@ from pathlib import Path
 from psvideo.calibrate.led_colours import LedColours, measure_led_colours, with_colours
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import said_of
-from psvideo.formats.plan_toml import PLAN_FILE, read_plan
+from psvideo.formats.clip_layout import PLAN_FILE
+from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.irradiance.colours import MOST_COLOUR_CONDITION

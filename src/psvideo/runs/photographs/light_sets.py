@@ -13,8 +13,9 @@ from psvideo.calibrate.still_places import Place
 from psvideo.clip.folder import MOVIES
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.plan_toml import PLAN_FILE, read_plan
+from psvideo.formats.plan_toml import read_plan
 from psvideo.runs.photographs.opened_sets import LightSets, Reading
 from psvideo.runs.photographs.same_scene import compared
 from psvideo.runs.photographs.sets_of_clip import refuse_other_curve, sets_of_clip

@@ -11,8 +11,9 @@ from psvideo.calibrate.still_pairs import Pairs
 from psvideo.clip import Clip
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.clip_layout import PLAN_FILE
 from psvideo.formats.light_lists.light_list_writer import write_rig
-from psvideo.formats.plan_toml import PLAN_FILE, format_plan
+from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_folder import RIG_FILE
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
