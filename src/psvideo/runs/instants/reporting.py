@@ -14,6 +14,7 @@ from psvideo.model.timing import Timing
 from psvideo.plates.several_lights.unmixed import slot_names
 from psvideo.report.html import report_page
 from psvideo.report.judge.every_line import judgements
+from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
@@ -54,39 +55,17 @@ def run_report(
     take: Take, timing: Timing, observed: Observed, output: Output, *, solved: Solved | None = None
 ) -> RunReport:
     """Return the report of a run over a take."""
-    clip = take.clip
-    known = None if solved is None else solved.lighting.rig
-    by_name = {} if known is None else {light.name: light for light in known.lights}
-    lights = tuple(
-        LightFacts(
-            name=name,
-            levels=observed.levels(name),
-            where=where_words(by_name.get(name)),
-            error_deg=by_name[name].error_deg if name in by_name else None,
-        )
-        for name in clip.plan.lights
-    )
-    judged = judgements(
-        clip.plan,
-        timing,
-        observed,
-        curve_doubt=clip.curve_doubt,
-        saturation=saturation_of(take),
-        levels=levels_of(take),
-        aligned=solved is not None and solved.aligned,
-        opened=solved is not None and solved.opened,
-    )
+    clip, spell = take.clip, output.caller.spell
     warned = (one for one in clip.warnings if one != clip.curve_doubt)  # which is judged
     warnings = (*warned, *(() if solved is None else solved.warnings))
-    spell = output.caller.spell
     return RunReport(
         clip=clip.name,
         version=__version__,
         kind="split" if solved is None else "normals",
         timing=timing,
-        lights=lights,
+        lights=_lights(clip.plan.lights, observed, None if solved is None else solved.lighting.rig),
         instants=tuple(observed.facts),
-        judgements=tuple(one.spelled(spell) for one in judged),
+        judgements=tuple(one.spelled(spell) for one in _judged(take, timing, observed, solved)),
         condition=None if solved is None else solved.lighting.condition,
         solver="" if solved is None else solved.solver,
         trust="" if solved is None else spell(solved.trust),
@@ -94,6 +73,33 @@ def run_report(
         shot={name: spell(words) for name, words in shot_words(clip, take.numbers).items()},
         settings=settings_words(take, output, solved),
         thumbnails=observed.thumbnails,
+    )
+
+
+def _lights(names: Sequence[str], observed: Observed, rig: Rig | None) -> tuple[LightFacts, ...]:
+    """Return what is known of every light, from its plates and from the rig, where there is one."""
+    by_name = {} if rig is None else {light.name: light for light in rig.lights}
+    return tuple(
+        LightFacts(
+            name=name,
+            levels=observed.levels(name),
+            where=where_words(by_name.get(name)),
+            error_deg=by_name[name].error_deg if name in by_name else None,
+        )
+        for name in names
+    )
+
+
+def _judged(take: Take, timing: Timing, observed: Observed, solved: Solved | None) -> Sequence[Judgement]:
+    return judgements(
+        take.clip.plan,
+        timing,
+        observed,
+        curve_doubt=take.clip.curve_doubt,
+        saturation=saturation_of(take),
+        levels=levels_of(take),
+        aligned=solved is not None and solved.aligned,
+        opened=solved is not None and solved.opened,
     )
 
 
