@@ -19,7 +19,7 @@ from psvideo.calibrate.stripes.readout import Led, Readout, measure_readout
 from psvideo.calibrate.stripes.waveform import fit_stripes
 from psvideo.capture import cameras
 from psvideo.cli.app import main
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
 

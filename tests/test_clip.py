@@ -17,8 +17,8 @@ from PIL.PngImagePlugin import PngInfo
 
 from psvideo.clip import holes, open_clip, parse_range, read_frames, reading
 from psvideo.clip.decode.decoders import decode
+from psvideo.clip.decoded import CodedPicture
 from psvideo.clip.folder import find_sequence
-from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding

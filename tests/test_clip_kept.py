@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 
 from psvideo.clip import Kept, keeping_near
 from psvideo.clip import kept as kept_module
-from psvideo.clip.record import CodedPicture, Header, PictureInFile
+from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 KINDS = st.sampled_from([np.uint8, np.uint16, np.float32])

@@ -13,7 +13,7 @@ from written_movies import RATE, grey_ramp, write_movie
 
 from psvideo.clip import keeping_near, open_clip, read_frames
 from psvideo.clip.decode.movies import movie, movie_frames
-from psvideo.clip.record import CodedPicture
+from psvideo.clip.decoded import CodedPicture
 
 
 @pytest.mark.parametrize(

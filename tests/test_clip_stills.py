@@ -22,7 +22,7 @@ from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode, opened, read_header
 from psvideo.clip.decode.exr import read_halves
 from psvideo.clip.decode.exr_chunks import is_cut_short
-from psvideo.clip.record import PictureInFile
+from psvideo.clip.decoded import PictureInFile
 from psvideo.errors import PsvideoError
 from psvideo.formats import exr_files
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.clip.linear import linear_light
-from psvideo.clip.record import CodedPicture, Header
 from psvideo.clip.tagged_curve import disagreement
 from psvideo.clip.transfer import CURVES, TransferCurve, find_curve, to_light
 from psvideo.errors import PsvideoError

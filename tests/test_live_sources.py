@@ -20,8 +20,8 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import read_frames
+from psvideo.clip.decoded import Header
 from psvideo.clip.filters import check_live_filters
-from psvideo.clip.record import Header
 from psvideo.clip.streams.growing_folder import _new_files, read_growing
 from psvideo.clip.streams.stream import StreamPlaces, read_stream
 from psvideo.clip.streams.stream_rate import StreamRate

@@ -16,7 +16,7 @@ from psvideo.cli.app import main
 from psvideo.clip import kept, reading
 from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
-from psvideo.clip.record import CodedPicture
+from psvideo.clip.decoded import CodedPicture
 from psvideo.report.observe.observed import Observed
 from psvideo.runs.instants import solving as runs
 from psvideo.solve.instants import surfaces

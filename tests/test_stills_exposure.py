@@ -25,7 +25,7 @@ from still_pictures import (
 
 import psvideo as ps
 from psvideo.clip.decode.decoders import decode
-from psvideo.clip.record import Header
+from psvideo.clip.decoded import Header
 from psvideo.clip.stated import Stated, relative_exposures
 from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.model.quantities import Aov

@@ -4,7 +4,7 @@
 curve and gives one frame after the other. ``keeping_near`` keeps decoded frames for a second look; ``demosaic`` makes
 colour of a mosaic.
 
-- records: ``record`` (a clip), ``take`` (a clip and the frames that are used)
+- records: ``record`` (a clip), ``take`` (a clip and the frames that are used), ``decoded`` (what decoders hand over)
 - finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves),
   ``profile_curve`` and ``stated_curve`` (by which curve they code light), ``filters`` (whether they are a mosaic) and
   ``movie_rate`` (how a movie's rate goes with the plan's)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from psvideo.clip.record import Header
+from psvideo.clip.decoded import Header
 from psvideo.errors import PsvideoError
 
 COLOUR = 3

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.clip.in_file import RowsInFile, read_whole
-from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 SHARE_OF_FREE_SPACE = 0.5

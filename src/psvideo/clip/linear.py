@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.movies.yuv import signal_range
-from psvideo.clip.record import CodedPicture, Header, Levels, PictureInFile
+from psvideo.clip.decoded import CodedPicture, Header, Levels, PictureInFile
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.movies.yuv import signal_range
+from psvideo.clip.decoded import Header
 from psvideo.clip.filters import check_filters
 from psvideo.clip.folder import MOVIES, RAWS, NumberedImages, find_sequence, unread
 from psvideo.clip.linear import depth_held, level_warning
-from psvideo.clip.record import Clip, Header
+from psvideo.clip.record import Clip
 from psvideo.clip.stated import stated_by
 from psvideo.clip.tagged_curve import disagreement, is_another_curve
 from psvideo.clip.transfer import DISPLAYED, find_curve

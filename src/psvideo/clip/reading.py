@@ -12,9 +12,10 @@ from fileseq.frameset import FrameSet
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import opened
+from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.clip.kept import Kept
 from psvideo.clip.linear import in_codes
-from psvideo.clip.record import Clip, CodedPicture, Frame, Header, PictureInFile
+from psvideo.clip.record import Clip, Frame
 from psvideo.compute.threads import in_order, thread_count
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.units import counted

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from psvideo.clip.decoded import Header
 from psvideo.clip.folder import RAWS
-from psvideo.clip.record import Header
 from psvideo.clip.stated import Stated
 from psvideo.clip.transfer import LOGARITHMIC
 from psvideo.errors import PsvideoError

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import decode, read_header
+from psvideo.clip.decoded import Header, shot_of
 from psvideo.clip.folder import KINDS
 from psvideo.clip.reading import looks
-from psvideo.clip.record import Clip, Header, shot_of
+from psvideo.clip.record import Clip
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.clip.stated_curve import curve_of_pictures
 from psvideo.clip.transfer import find_curve

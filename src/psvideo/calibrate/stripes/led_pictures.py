@@ -17,9 +17,9 @@ from psvideo.clip import parse_range
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.decode.movies.movie import index_movie
 from psvideo.clip.decode.movies.movie_frames import read_movie
+from psvideo.clip.decoded import CodedPicture
 from psvideo.clip.folder import KINDS, MOVIES, find_sequence
 from psvideo.clip.reading import looks
-from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.arrays import Doubles
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
-from psvideo.clip.record import CodedPicture, Header, PictureInFile
+from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 from psvideo.model.units import counted

@@ -18,7 +18,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.tiff import LINEAR_RAW, MOSAIC, MOST_PAGES, check_places, pixels, sample_bits
-from psvideo.clip.record import CodedPicture, Header, Levels, shot_of
+from psvideo.clip.decoded import CodedPicture, Header, Levels, shot_of
 from psvideo.errors import PsvideoError
 from psvideo.model.turn import EXIF, UPRIGHT
 

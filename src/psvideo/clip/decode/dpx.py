@@ -8,7 +8,7 @@ import numpy as np
 
 from psvideo.clip.decode.movies.ffmpeg_planes import planes
 from psvideo.clip.decode.signatures import begins_like
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.clip.transfer import LOGARITHMIC
 from psvideo.errors import PsvideoError
 

@@ -18,7 +18,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.exr_chunks import is_cut_short
-from psvideo.clip.record import CodedPicture, Header, shot_of
+from psvideo.clip.decoded import CodedPicture, Header, shot_of
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 

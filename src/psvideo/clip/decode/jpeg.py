@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.signatures import begins_like
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.model.units import counted
 

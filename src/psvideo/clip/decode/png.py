@@ -10,7 +10,7 @@ from pathlib import Path
 import imagecodecs
 
 from psvideo.clip.decode.signatures import begins_like
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 logging.getLogger("imagecodecs").addHandler(logging.NullHandler())  # its remarks on odd profiles are no user's concern

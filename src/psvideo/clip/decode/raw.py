@@ -12,7 +12,7 @@ import numpy as np
 import rawpy
 from numpy.typing import NDArray
 
-from psvideo.clip.record import CodedPicture, Header, Levels
+from psvideo.clip.decoded import CodedPicture, Header, Levels
 from psvideo.errors import PsvideoError
 from psvideo.model.turn import EXIF, UPRIGHT, Turn
 

@@ -10,8 +10,8 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
+from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.clip.in_file import RowsInFile
-from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 # tifffile writes to its own log what it thinks of odd tags; what matters of it is raised here.

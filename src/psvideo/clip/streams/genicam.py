@@ -20,9 +20,10 @@ from urllib.parse import parse_qsl
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.linear import in_codes
-from psvideo.clip.record import CodedPicture, Frame, Header
+from psvideo.clip.record import Frame
 from psvideo.clip.streams.genicam_camera import HEAD
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Camera

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.clip.decode.decoders import opened
+from psvideo.clip.decoded import CodedPicture, PictureInFile
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.folder import KINDS, number_of
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
-from psvideo.clip.record import CodedPicture, Frame, PictureInFile
+from psvideo.clip.record import Frame
 from psvideo.errors import PsvideoError
 from psvideo.formats.clip_layout import FRAMES
 from psvideo.model.camera import Camera

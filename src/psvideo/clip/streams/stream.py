@@ -14,10 +14,11 @@ from pathlib import Path
 import av
 
 from psvideo.clip.decode.movies.movie_codes import rgb_codes
+from psvideo.clip.decoded import CodedPicture
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.linear import in_codes, level_warning
 from psvideo.clip.reading import looks
-from psvideo.clip.record import CodedPicture, Frame
+from psvideo.clip.record import Frame
 from psvideo.clip.streams.stream_rate import StreamRate
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import Camera

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.clip import Clip, read_frames
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.clip.linear import in_codes
-from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.live.incoming.live_frame import LiveFrame
 from psvideo.model.camera import Encoding

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import opened
+from psvideo.clip.decoded import Header
 from psvideo.clip.in_file import RowsInFile
-from psvideo.clip.record import Header
 from psvideo.clip.stills import Photographs
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.model.arrays import Doubles, Integers

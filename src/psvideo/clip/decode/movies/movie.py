@@ -19,7 +19,7 @@ from psvideo.clip.decode.movies.movie_times import (
     promised_frames,
     stamps_of,
 )
-from psvideo.clip.record import Header
+from psvideo.clip.decoded import Header
 from psvideo.errors import PsvideoError
 from psvideo.model.units import counted
 

@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.clip.decode.movies.ffmpeg_planes import planes
 from psvideo.clip.decode.movies.movie_tags import gamut_of, side_data_of, transfer_of, turn_of
 from psvideo.clip.decode.movies.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.decoded import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG

@@ -12,7 +12,7 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from psvideo.clip.decode.movies.movie_codes import rgb_codes
-from psvideo.clip.record import CodedPicture
+from psvideo.clip.decoded import CodedPicture
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 

@@ -11,7 +11,7 @@ import numpy as np
 from av.sidedata.sidedata import SideDataContainer
 from av.video.codeccontext import VideoCodecContext
 
-from psvideo.clip.record import shot_of
+from psvideo.clip.decoded import shot_of
 from psvideo.clip.transfer import BY_H273
 from psvideo.model.turn import UPRIGHT, Turn, of_matrix
 
