@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from psvideo.capture.drawing.diagram import check_diagram_name, diagram_text, write_diagram
+from psvideo.capture.drawing.diagram_shapes import HEIGHT, LIGHT_COLOURS, WIDTH, timing_diagram
 from psvideo.capture.drawing.draw_png import png
 from psvideo.capture.drawing.draw_svg import svg
-from psvideo.capture.drawing.shapes import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_diagram
+from psvideo.capture.drawing.shapes import Label, Polygon
 from psvideo.capture.drawing.timeline import timeline
 from psvideo.errors import UsageError
 from psvideo.model.plan import Plan

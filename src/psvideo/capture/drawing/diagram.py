@@ -4,10 +4,10 @@ from pathlib import Path
 
 from rich.text import Text
 
+from psvideo.capture.drawing.diagram_shapes import timing_diagram
 from psvideo.capture.drawing.draw_png import png
 from psvideo.capture.drawing.draw_svg import svg
 from psvideo.capture.drawing.draw_text import timing_text
-from psvideo.capture.drawing.shapes import timing_diagram
 from psvideo.errors import UsageError
 from psvideo.formats.whole_files import PICTURE_MARK, marked_png, whole_file
 from psvideo.model.plan import Plan

@@ -2,7 +2,7 @@
 
 from rich.text import Text
 
-from psvideo.capture.drawing.shapes import kind_colour
+from psvideo.capture.drawing.diagram_shapes import kind_colour
 from psvideo.capture.drawing.timeline import FrameSpans, Timeline, timeline
 from psvideo.model.plan import Plan
 
