@@ -13,11 +13,12 @@ from bench.accuracy_motion import ASLANT, BOX, UNALIGNED, filmed, turn
 
 from psvideo.model.rig import Light, Rig
 from psvideo.plates.align import rounds
-from psvideo.plates.align.as_they_are import BothWays, Lamps, fits_as_it_is
+from psvideo.plates.align.as_they_are import BothWays, Lamps, fits_as_it_is, stands_under
 from psvideo.plates.align.as_they_are_kernel import CLIPPED, leave_rows
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, light_of
+from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
@@ -207,6 +208,46 @@ def test_rows_that_no_frame_saw_of_a_nearer_plate_are_taken_as_before(monkeypatc
         np.testing.assert_allclose(one.image[hidden], own.image[hidden], atol=1e-4)
         np.testing.assert_array_equal(one.pixels_seen[hidden], own.pixels_seen[hidden])
     assert any(np.abs(one.image - own.image).max() > 0.05 for one, own in zip(left.plates, moved.plates, strict=True))
+
+
+def shadowed(lights: str) -> Round:
+    """The second of three rounds before a painted wall: to its right half none of these lights comes in the first."""
+    rng, plates = np.random.default_rng(3), []
+    paint = cv2.GaussianBlur(rng.uniform(0, 1, (96, 192)), (0, 0), 3)
+    paint = 0.3 + 0.5 * (paint - paint.min()) / np.ptp(paint)
+    for number in (1, 2, 3):
+        for n, (name, row) in enumerate(zip(NAMES, MATRIX, strict=True)):
+            light = paint * (ONE @ row)
+            light[:, 96:] *= number > 1 or name not in lights
+            picture = mixture_of(np.asarray(light + rng.normal(0, 0.002, light.shape), np.float32))
+            time_s, seen = (6 * (number - 2) + n - 2) * PITCH_S, np.ones(len(light), np.bool_)
+            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=picture, seen=seen))
+    return list(aligned(plates, NAMES, Aligning(lights=LIGHTS), first=1))[1]
+
+
+def test_what_stands_while_a_shadow_passes_is_as_sure_as_without_motion() -> None:
+    """Four of five lights show that nothing moved; the fifth's nearer plate was lit."""
+    one = shadowed("e")
+    assert one.unsure is not None
+    inside = (slice(8, -8), slice(104, 184))
+    assert one.unsure[:, inside[0], inside[1]].max() < 0.004
+    assert np.ptp(one.plates[4].image[inside]) > 0.1
+    assert one.plates[4].image[inside].min() > 0.15
+
+
+def test_what_changes_under_half_of_the_lights_may_have_moved() -> None:
+    one = shadowed("de")
+    assert one.unsure is not None
+    assert np.median(one.unsure[3:, 8:-8, 104:184]) > 0.02
+
+
+@pytest.mark.parametrize(("lights", "least"), [(3, 3), (4, 3), (5, 4), (8, 6)])
+def test_most_lights_and_three_at_least_must_show_that_nothing_moved(lights: int, least: int) -> None:
+    unchanged = np.arange(9, dtype=np.int16)[None]
+    still, none = np.zeros((1, 9), np.bool_), np.zeros((2, 1, 9), np.float32)
+    motion = Followed(time_s=0.0, velocity=none, moves=still, rests=still, unchanged=unchanged)
+    assert np.array_equal(stands_under(motion, lights), unchanged >= least)
+    assert not stands_under(replace(motion, moves=~still), lights).any()
 
 
 @pytest.mark.campaign

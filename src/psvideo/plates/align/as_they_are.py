@@ -1,7 +1,8 @@
 """Where plates as they are show one surface, and plates brought to an instant do not: nothing is moved there.
 
 Flow that fits by chance, and a blend of two plates between which an edge passed, turn normals. Of four lights and more
-one normal and one albedo tell: they explain the plates of all lights where these show the same surface.
+one normal and one albedo tell: they explain the plates of all lights where these show the same surface. Where most
+lights show that nothing passed, what changes under the others is a shadow, and nothing is moved there either.
 """
 
 from collections.abc import Sequence
@@ -12,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Flags
+from psvideo.model.arrays import Codes8, Flags
 from psvideo.model.rig import Light, directions
 from psvideo.plates.align.as_they_are_kernel import SOLVED, leave_rows
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.pixel_sources import Taken
+from psvideo.plates.align.velocity.all_lights import STILL_SHARE
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, SCALE, light_of
 from psvideo.plates.align.velocity.flow import TOE, all_of, comparable
 from psvideo.plates.align.velocity.followed import Followed, Pair
-from psvideo.plates.align.velocity.moving_kernel import AT_REST
+from psvideo.plates.align.velocity.moving_kernel import AT_REST, NOWHERE
 
 LEFT = np.float32(0.5)
 """Plates as they are must leave less than this share of what moved ones leave, beyond what is usual."""
@@ -94,19 +96,45 @@ def fits_as_it_is(lamps: Lamps, lights: Sequence[BothWays]) -> Flags:
     return np.asarray(share > np.float32(0.5))
 
 
-def left_as_it_is(one: Taken, pair: Pair, motion: Followed, still: Flags) -> Taken:
-    """Return what is taken of a light's plates with its nearer plate as it is where ``still``; ``motion`` no longer
-    moves there."""
-    two, shape = comparable(pair.before, pair.after), motion.moves.shape[::-1]
-    before, after = (np.asarray(cv2.resize(codes, shape, interpolation=cv2.INTER_AREA), np.uint8) for codes in two)
-    unsure = unsure_of(pair, before, after, motion, one.shows.noise)
-    codes = np.where(still, nearest_of(pair, motion).codes, one.shows.codes)
-    return replace(
-        one,
-        source=np.where(still, np.uint8(AT_REST), one.source),
-        unsure=np.where(still, unsure, one.unsure),
-        shows=replace(one.shows, codes=codes),
-    )
+def stands_under(motion: Followed, lights: int) -> Flags:
+    """Return what stands still, (row, col): most of so many ``lights`` show it unchanged.
+
+    What passes within a round changes every light: those before it differ from their next plate, those after it from
+    their last one. So what changes under few of them is their shadow, and leaves the surface as it is.
+    """
+    return np.asarray(~motion.moves & (motion.unchanged >= max(SOLVED, STILL_SHARE * lights)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AsTheyAre:
+    """Where all lights keep their nearer plate, (row, col): ``fits``, where only so they show one surface, and
+    ``stands``, where nothing but shadows passed."""
+
+    fits: Flags
+    stands: Flags
+
+    def taken(self, one: Taken, pair: Pair, motion: Followed) -> Taken:
+        """Return what is taken of a light's plates; ``motion`` no longer moves there. What stands is as sure as without
+        motion."""
+        if not (still := self.fits | self.stands).any():
+            return one
+        unsure = one.unsure
+        if self.fits.any():
+            two, shape = comparable(pair.before, pair.after), motion.moves.shape[::-1]
+            before, after = (cv2.resize(codes, shape, interpolation=cv2.INTER_AREA).astype(np.uint8) for codes in two)
+            unsure = np.where(self.fits, unsure_of(pair, before, after, motion, one.shows.noise), unsure)
+        codes = np.where(still, nearest_of(pair, motion).codes, one.shows.codes)
+        return replace(
+            one,
+            source=np.where(still, np.uint8(AT_REST), one.source),
+            unsure=np.where(self.stands, np.float32(0), unsure),
+            shows=replace(one.shows, codes=codes),
+        )
+
+    def source(self, one: Taken, own: Codes8) -> Codes8:
+        """Return what a light's pixels come from, ``own`` elsewhere. What was left out of what stands stays so: enough
+        other lights are sure."""
+        return np.where(self.fits | (self.stands & (own != NOWHERE)), one.source, own)
 
 
 def seen_by_all(pairs: Sequence[Pair], motion: Followed) -> Flags:

@@ -14,12 +14,13 @@ from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.model.choices import Align, Rate
 from psvideo.model.rig import Light
 from psvideo.plates.align.as_they_are import (
+    AsTheyAre,
     BothWays,
     Lamps,
     fits_as_it_is,
-    left_as_it_is,
     nearest_of,
     seen_by_all,
+    stands_under,
 )
 from psvideo.plates.align.between import Ends, plate_at
 from psvideo.plates.align.comb import Comb, Schedule
@@ -194,19 +195,18 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     """Make the plates of all lights under which something moves; each is let go as soon as it was used."""
     lights = [light for light in held.lights if light in instant.moving]
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
-    instant.motion = motion = followed_at(pairs, instant.time_s)
+    instant.motion = motion = followed_at(pairs, instant.time_s, others=len(held.lights) - len(lights))
     shown = over_ranges(lambda n, _: taken_of(pairs[n], motion, guessed=instant.guessed), len(pairs), each=1)
     guesses = sources = [one.source for one in shown]
     unknown = np.zeros_like(motion.moves)
     if not instant.guessed:
         better = _better_without(held, instant, dict(zip(lights, shown, strict=True)))
         sources, unknown = without_doubtful(shown, motion, len(held.lights) - len(lights), better)
-        still = _fitting_as_they_are(held, instant, dict(zip(lights, pairs, strict=True)), shown)
-        if still.any():
-            instant.motion = motion = motion.without(still)
-            shown = [left_as_it_is(one, pair, motion, still) for one, pair in zip(shown, pairs, strict=True)]
-            sources = [np.where(still, one.source, own) for one, own in zip(shown, sources, strict=True)]
-            guesses = [one.source for one in shown]
+        kept = _as_they_are(held, instant, motion, dict(zip(lights, pairs, strict=True)), shown)
+        instant.motion = motion = motion.without(kept.fits)
+        shown = [kept.taken(one, pair, motion) for one, pair in zip(shown, pairs, strict=True)]
+        sources = [kept.source(one, own) for one, own in zip(shown, sources, strict=True)]
+        unknown, guesses = unknown & ~kept.stands, [one.source for one in shown]
     instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
     instant.unsure[:, unknown] = UNKNOWN
     own = held.own_flows.of(dict(zip(lights, pairs, strict=True))) if instant.guessed else dict[str, OwnFlow]()
@@ -247,21 +247,25 @@ def _better_without(held: Held, instant: DueInstant, taken: dict[str, Taken]) ->
     return better
 
 
-def _fitting_as_they_are(held: Held, instant: DueInstant, pairs: dict[str, Pair], shown: Sequence[Taken]) -> Flags:
-    """Return where plates as they are show one surface, and those that are taken do not; nowhere where the lights do
-    not tell."""
-    if held.lamps is None or instant.motion is None:
-        return np.zeros((1, 1), np.bool_)
-    ways, motion = dict(zip(pairs, shown, strict=True)), instant.motion
-    both = []
+def _as_they_are(
+    held: Held, instant: DueInstant, motion: Followed, pairs: dict[str, Pair], shown: Sequence[Taken]
+) -> AsTheyAre:
+    """Return where plates as they are show one surface, and those that are taken do not, which is nowhere where the
+    lights do not tell; and what stands still."""
+    seen = seen_by_all([*pairs.values()], motion)
+    stands = stands_under(motion, len(held.lights)) & seen
+    nowhere = AsTheyAre(fits=np.zeros((1, 1), np.bool_), stands=stands)
+    if held.lamps is None:
+        return nowhere
+    ways, both = dict(zip(pairs, shown, strict=True)), []
     for light in held.lights:
         if light in ways:
             both.append(BothWays(rest=nearest_of(pairs[light], motion), moved=ways[light].shows))
         elif (sketch := held.shots[light][instant.round].sketch) is not None:
             both.append(BothWays.standing(InstantSketch.standing(sketch, motion.moves.shape)))
     if len(both) < len(held.lights):
-        return np.zeros((1, 1), np.bool_)
-    return fits_as_it_is(held.lamps, both) & seen_by_all([*pairs.values()], motion)
+        return nowhere
+    return AsTheyAre(fits=fits_as_it_is(held.lamps, both) & seen, stands=stands)
 
 
 def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes8]) -> Floats:

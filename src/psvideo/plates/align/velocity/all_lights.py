@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.eight_lanes import EIGHT
 from psvideo.compute.threads import WRITING_THREADS, over_ranges, thread_count
@@ -94,8 +95,8 @@ class AllLights:
                 within &= (ends >= 0) & (ends <= size - 1)
         return within
 
-    def stirs(self) -> Flags:
-        """Return what is not at rest, shape (row, col)."""
+    def unchanged(self) -> NDArray[np.int16]:
+        """Return under how many lights every pixel shows the same at rest, shape (row, col)."""
         rows, cols = (length * self.step for length in self.shape)
 
         def still(light: int, _: int) -> Flags:
@@ -104,8 +105,12 @@ class AllLights:
             little = mean_over(np.asarray(change * change, np.float32), STILL_PX) < STILL_CODES**2
             return np.asarray(little[: rows : self.step, : cols : self.step])
 
-        count = np.sum(over_ranges(still, self.count, each=1), axis=0, dtype=np.int16)
-        return np.asarray(count < max(STILL_LIGHTS, STILL_SHARE * self.count))
+        return np.asarray(np.sum(over_ranges(still, self.count, each=1), axis=0, dtype=np.int16))
+
+    def at_rest(self, unchanged: NDArray[np.int16], others: int) -> Flags:
+        """Return what rests, by under how many lights it is ``unchanged``, both (row, col), among them ``others`` under
+        which nothing moves."""
+        return np.asarray(unchanged >= max(STILL_LIGHTS, STILL_SHARE * (self.count + others)))
 
     def proposed(self) -> list[Floats]:
         """Return the velocities that flow proposes: both ways of few lights, one way of each of more."""

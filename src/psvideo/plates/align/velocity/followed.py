@@ -1,10 +1,11 @@
 """What is followed, and what comes of it: plates of a light in pairs, and one velocity for every pixel."""
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.velocity.flow import Sketch
@@ -21,13 +22,15 @@ class Pair:
 @dataclass(frozen=True, kw_only=True)
 class Followed:
     """``velocity`` (2, row, col) is x right, y down, in its own pixels per second, 0 where not ``moves``. ``rests``
-    (row, col) is what clearly stands beside that; the rest looks alike either way. Each of these pixels is ``step`` by
-    ``step`` of the sketches'."""
+    (row, col) is what clearly stands beside that; the rest looks alike either way. ``unchanged`` (row, col) is
+    under how many of all lights a pixel that does not move shows the same before and after. Each of these pixels is
+    ``step`` by ``step`` of the sketches'."""
 
     time_s: float
     velocity: Floats
     moves: Flags
     rests: Flags
+    unchanged: NDArray[np.int16] = field(default_factory=lambda: np.zeros((1, 1), np.int16))
     step: int = 1
 
     @functools.cached_property

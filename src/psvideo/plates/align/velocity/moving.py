@@ -49,8 +49,9 @@ pairs to 0.045, the difference of two such means to 0.065, so that chance makes 
 LEAST = np.float32(1e-6)
 
 
-def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
-    """Return how everything moves at an instant, which may lie before or after some lights' plates too."""
+def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0) -> Followed:
+    """Return how everything moves at an instant, which may lie before or after some lights' plates too. ``others`` is
+    the number of lights under which nothing moves."""
     lights = AllLights.of(pairs, time_s)
     between = BetweenLights.of(lights.codes, lights.spans_s, lights.shape)
     none = np.zeros((2, *lights.shape), np.float32)
@@ -58,7 +59,8 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     wide_rest, fine_rest = lights.mean(rest, WINDOW_PX), lights.mean(rest, FINE_PX)
     chosen = _best(lights, between, wide_rest)
     velocity, best, fine = chosen.velocity, chosen.wide, lights.mean(chosen.unlike, FINE_PX)
-    stirs = lights.stirs()
+    unchanged = np.asarray(lights.unchanged() + others, np.int16)
+    stirs = ~lights.at_rest(unchanged, others)
     moves = _clearly(best, wide_rest, lights.count) & (fine < np.float32(FINE_EXPLAINED) * fine_rest) & stirs
     rested = between.disagree(none, REFUTED_PX)
     moves &= ~_refuted(rested, between.disagree(velocity, REFUTED_PX))
@@ -67,7 +69,14 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
         moves, rests = _grown(lights, moves, velocity, (wide_rest, fine_rest), stirs)
     moves &= ~_refuted(rested, between.disagree(velocity, REFUTED_PX))
     velocity *= moves
-    return Followed(time_s=time_s, velocity=velocity, moves=moves, rests=rests & ~moves, step=lights.step)
+    return Followed(
+        time_s=time_s,
+        velocity=velocity,
+        moves=moves,
+        rests=rests & ~moves,
+        unchanged=np.where(moves, np.int16(0), unchanged),
+        step=lights.step,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
