@@ -36,7 +36,7 @@ SUBJECTS: dict[str, Callable[[], Case]] = {
 class Trusted(NamedTuple):
     """The mean over sets: the share of the subject that is trusted, and how much of it is over 10 degrees; the latter
     of all sets' pixels together, and of the worst set, as well. Of what was measured the shares within the claim and
-    within twice, and its correlation with truth."""
+    within twice, the median claim over the median error, and their correlation."""
 
     subject: str
     lights: int
@@ -46,6 +46,7 @@ class Trusted(NamedTuple):
     worst: str
     within: str
     within_twice: str
+    claimed: str
     correlation: str
     bar: str
     met: bool
@@ -57,6 +58,7 @@ class _Set:
     over: float
     within: float
     within_twice: float
+    claimed: float
     correlation: float
 
 
@@ -84,6 +86,7 @@ def _solved(case: Case, count: int) -> Iterator[_Set]:
             over=float(np.mean(off_deg[trusted] > 10)) if trusted.any() else 0.0,
             within=float(np.mean(off <= claim)),
             within_twice=float(np.mean(off <= 2 * claim)),
+            claimed=float(np.median(claim) / np.median(off)),
             correlation=float(np.corrcoef(claim, off)[0, 1]),
         )
 
@@ -112,6 +115,7 @@ def _row(name: str, count: int, sets: list[_Set]) -> Trusted:
         worst=f"{100 * max(one.over for one in sets):.0f} %",
         within=f"{100 * mean('within'):.0f} %",
         within_twice=f"{100 * mean('within_twice'):.0f} %",
+        claimed=f"{mean('claimed'):.2f}",
         correlation=f"{mean('correlation'):.2f}",
         bar=f"over 10 deg <= {100 * MOST_OVER:.0f} %",
         met=mean("over") <= MOST_OVER,
