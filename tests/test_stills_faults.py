@@ -26,6 +26,17 @@ def test_pictures_a_folder_deeper_are_pointed_to(tmp_path: Path) -> None:
         ps.stills(tmp_path, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
 
 
+def test_of_several_folders_with_pictures_each_is_named_before_a_ball_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in archives that hold a subject's folder beside those of two balls."""
+    for name in ("ball_left", "ball_right", "subject"):
+        photographs(tmp_path / name, lit())
+    monkeypatch.setattr("psvideo.runs.stills.sphere_lights", lambda *_, **__: pytest.fail("minutes were lost"))
+    with pytest.raises(PsvideoError, match=r"pictures: ball_left, ball_right, subject\. Name one of these\."):
+        ps.stills(tmp_path, sphere=[tmp_path / "ball_left"], out=tmp_path / "out")
+
+
 BAD: dict[str, tuple[str, ...]] = {
     "unknown light": ("names 9.png, and no picture is called so", "Pictures without a light: shot 22.png"),
     "too few lights": ("holds 6 pictures of lights", "lists 5 lights"),

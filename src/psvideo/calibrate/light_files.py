@@ -17,6 +17,8 @@ from psvideo.formats.whole_files import is_drawn
 TIMING = "timing.json"
 FEWEST_TO_ONE = 4
 """This many numbered files for one of another name make that one no light (a mask); with fewer, all are lights."""
+SHOWN = 6
+"""So many folders are named of those that hold pictures."""
 NOT_LIGHTS = ("flashes", "beauty", "truth")
 """Folders that may lie beside the lights' own: single flashes, the lights' sum, and a virtual shoot's truth."""
 
@@ -104,9 +106,17 @@ def _instead(folder: Path) -> str:
     kinds = ", ".join(USUAL_KINDS)
     expected = f"Expected still photographs, one per light ({kinds}), or a folder of plates per light."
     inner = [entry for entry in sorted(folder.iterdir()) if entry.is_dir() and pictures_in(entry)]
-    if len(inner) == 1:
-        expected += f" The folder {inner[0].name} in it holds pictures: name that one."
+    if inner:
+        expected += f" {_named(inner)}"
     return f"{expected} {unread_in(folder)}".rstrip()
+
+
+def _named(inner: Sequence[Path]) -> str:
+    """Say which folders below hold pictures, one or several."""
+    if len(inner) == 1:
+        return f"The folder {inner[0].name} in it holds pictures: name that one."
+    more = f" and {len(inner) - SHOWN} more" if len(inner) > SHOWN else ""
+    return f"Folders in it hold pictures: {', '.join(one.name for one in inner[:SHOWN])}{more}. Name one of these."
 
 
 def pictures_in(folder: Path) -> list[Path]:

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from psvideo.calibrate.sphere.sphere_view import Looking
+from psvideo.calibrate.light_files import find_stills
 from psvideo.calibrate.still_pairs import pair_stills
 from psvideo.clip import Take, decoded_once
 from psvideo.clip.transfer import check_transfer
@@ -112,6 +113,8 @@ def stills(
         raise UsageError("`aov='motion'`: photographs of a still scene show no motion. Leave it out.")
     asked = Asked(preset=preset, aov=aov, mesh=mesh, encode=encode, plates=plates)
     delivery, _ = delivery_of(asked)
+    if path.is_dir():
+        find_stills(path)
     looking = looking_for(spheres, circle, focal_px, focal_mm, sensor_mm)
     known = _known_lights(
         path_if_given("lights", lights),
