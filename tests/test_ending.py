@@ -7,9 +7,11 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -29,6 +31,28 @@ def number(request: pytest.FixtureRequest) -> Iterator[int]:
     before = signal.signal(asked, signal.default_int_handler)
     yield asked
     signal.signal(asked, before)
+
+
+def test_a_stop_that_is_asked_for_again_ends_nothing_once_its_command_has_ended(
+    number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a busy machine it came so late: the command said that it had stopped, and its status was the signal's."""
+    raised, raise_signal = threading.Event(), signal.raise_signal
+
+    def raise_late(asked: int) -> None:
+        raised.set()
+        time.sleep(0.2)
+        raise_signal(asked)
+
+    def end() -> None:
+        sys.unraisablehook(SimpleNamespace(exc_value=KeyboardInterrupt(number)))
+        assert raised.wait(10)
+        raise ValueError("for the stop's sake")
+
+    monkeypatch.setattr(signal, "raise_signal", raise_late)
+    with pytest.raises(KeyboardInterrupt), stoppable():
+        end()
+    time.sleep(0.4)  # here it would be heard
 
 
 def test_what_asks_a_program_to_end_stops_it_as_ctrl_c_does(number: int) -> None:

@@ -62,8 +62,10 @@ def stoppable(*, stops: int = 1) -> Iterator[None]:
             raise KeyboardInterrupt from fault
         raise
     finally:
-        for timer in heard.later:
+        heard.is_over = True
+        for timer in heard.later:  # one that goes off meanwhile would end the process after its command, in no order
             timer.cancel()
+            timer.join()
         for number in obeyed:
             signal.signal(number, before[number])
         sys.unraisablehook = heard.say_dropped
@@ -75,12 +77,14 @@ class _Heard:
 
     def __init__(self, stops: int) -> None:
         self.left, self.pending = stops, False
-        self.is_dropping = False
+        self.is_dropping, self.is_over = False, False
         self.later: list[threading.Timer] = []
         self.say_dropped = sys.unraisablehook
 
     def stop(self, number: int, frame: FrameType | None) -> None:
         """Stop the command while any stop is left, end the process afterwards."""
+        if self.is_over:
+            return
         if self.is_dropping:
             self._stop_later(number)
             return
@@ -99,8 +103,9 @@ class _Heard:
         self.is_dropping = False
 
     def _stop_later(self, number: int) -> None:
-        self.later.append(threading.Timer(LATER_S, signal.raise_signal, (number,)))
-        self.later[-1].start()
+        again = threading.Timer(LATER_S, signal.raise_signal, (number,))
+        again.start()
+        self.later.append(again)
 
 
 class _Starved(logging.Handler):

@@ -6,8 +6,8 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.light_files import find_stills
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_pairs import pair_stills
 from psvideo.clip import Take, decoded_once
 from psvideo.clip.transfer import check_transfer
