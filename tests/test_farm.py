@@ -10,25 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from openjd.model import decode_job_template
+from synced_plan import SYNCED_PLAN
 
 from psvideo.cli.app import main
 from psvideo.errors import UsageError
 from psvideo.runs.farm import farm
 
-CLIP = """
-schema = "psvideo-plan/1"
-[camera]
-name = "small"
-width_px = 24
-height_px = 16
-fps = 100
-transfer = "linear"
-black_level = 0
-white_level = 65535
-[strobe]
-mode = "synced"
-flash = [{ lights = { a = 1.0 } }, { lights = { b = 1.0 } }, { lights = { c = 1.0 } }]
-"""
 RIG = """
 schema = "psvideo-rig/1"
 light = [
@@ -46,7 +33,7 @@ def clip(tmp_path: Path) -> Path:
 
     folder = tmp_path / "a clip"
     folder.mkdir()
-    (folder / "plan.toml").write_text(CLIP, encoding="utf-8")
+    (folder / "plan.toml").write_text(SYNCED_PLAN, encoding="utf-8")
     (folder / "rig.toml").write_text(RIG, encoding="utf-8")
     rng = np.random.default_rng(2)
     for number in range(1, 13):

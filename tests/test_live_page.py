@@ -6,6 +6,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from live_clip import live_clip
+from live_standing import standing
 
 import psvideo as ps
 from psvideo.errors import UsageError
@@ -52,24 +54,8 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 def status_of(*, fps: float, frames: int, state: LiveState = "locked") -> LiveStatus:
-    return LiveStatus(
-        at_s=9.0,
-        state=state,
-        fps=fps,
-        frames=frames,
-        lost=0,
-        results=9,
-        results_per_s=0.0,
-        age_s=None,
-        oldest_s=None,
-        phase_error_rows=None,
-        clock_offset_ppm=None,
-        order=None,
-        width_px=96,
-        height_px=72,
-        recorded=18,
-        record_ended=frames > 100,
-    )
+    stands = standing(at_s=9.0, state=state, fps=fps, frames=frames)
+    return replace(stands, results=9, recorded=18, record_ended=frames > 100)
 
 
 def test_a_page_says_in_large_type_that_no_frames_come_and_that_recording_ended(served: Served) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_clip import live_clip
+from live_standing import standing
 from memory_frame import MemoryFrame
 
 import psvideo as ps
@@ -34,7 +35,6 @@ from psvideo.live.status import SAID, LiveState, LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
-from psvideo.model.timing import Order
 from psvideo.runs.live import live
 from psvideo.synth import TrueClock, expose
 
@@ -89,25 +89,6 @@ def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: 
     assert order == ["rehearsed", "read"]
     assert left_alone[0] > 10_000, "no search for cycles among what is loaded holds frames up"
     assert gc.get_freeze_count() == 0
-
-
-def standing(*, at_s: float, state: LiveState, fps: float, frames: int, order: Order | None = None) -> LiveStatus:
-    return LiveStatus(
-        at_s=at_s,
-        state=state,
-        fps=fps,
-        frames=frames,
-        lost=0,
-        results=0,
-        results_per_s=0.0,
-        age_s=None,
-        oldest_s=None,
-        phase_error_rows=None,
-        clock_offset_ppm=None,
-        order=order,
-        width_px=96,
-        height_px=72,
-    )
 
 
 def test_where_lines_stay_one_comes_when_something_changes_and_every_ten_seconds(

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from synced_plan import SYNCED_PLAN
 
 from psvideo.cli.app import main
 from psvideo.clip.decode.decoders import decode
@@ -17,20 +18,6 @@ from psvideo.formats.rig_toml import format_rig
 from psvideo.model.rig import Light, Rig
 from psvideo.runs.farm import farm
 
-PLAN = """
-schema = "psvideo-plan/1"
-[camera]
-name = "small"
-width_px = 24
-height_px = 16
-fps = 100
-transfer = "linear"
-black_level = 0
-white_level = 65535
-[strobe]
-mode = "synced"
-flash = [{ lights = { a = 1.0 } }, { lights = { b = 1.0 } }, { lights = { c = 1.0 } }]
-"""
 STRAIGHT = {"a": (0.6, 0.0, 0.8), "b": (-0.6, 0.0, 0.8), "c": (0.0, 0.6, 0.8)}
 TURNED = {"a": (0.8, 0.0, 0.6), "b": (-0.28, 0.0, 0.96), "c": (0.0, 0.8, 0.6)}
 """Where the lights stood in the one take, and where in the other."""
@@ -44,7 +31,7 @@ def place(tmp_path: Path) -> Path:
     for name, directions in (("shot1", STRAIGHT), ("shot2", TURNED)):
         clip = tmp_path / "takes" / name
         clip.mkdir(parents=True)
-        (clip / "plan.toml").write_text(PLAN, encoding="utf-8")
+        (clip / "plan.toml").write_text(SYNCED_PLAN, encoding="utf-8")
         rig = Rig(lights=tuple(Light(name=light, direction=at) for light, at in directions.items()))
         (tmp_path / "rigs" / f"{name}.toml").write_text(format_rig(rig), encoding="utf-8")
         facing = [at[2] for at in directions.values()] * 2
