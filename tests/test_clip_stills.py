@@ -382,6 +382,16 @@ def test_a_strip_of_no_bytes_is_not_taken_for_black(tmp_path: Path) -> None:
         decode("tiff", tmp_path / "x.tif")
 
 
+@pytest.mark.parametrize("harm", [lambda data: data.replace(b"\r\n", b"\n", 1), lambda data: data[:20]])
+def test_a_png_whose_beginning_is_damaged_is_not_told_to_be_called_one(
+    tmp_path: Path, harm: Callable[[bytes], bytes]
+) -> None:
+    whole = imagecodecs.png_encode(np.zeros((8, 8), np.uint8))
+    (tmp_path / "x.png").write_bytes(harm(bytes(whole)))
+    with pytest.raises(PsvideoError, match=r"truncated or damaged.*Copy it again\."):
+        decode("png", tmp_path / "x.png")
+
+
 def test_kinds_of_content_that_are_not_read_say_what_is(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "deep.tif", np.zeros((4, 4), np.uint32))
     with pytest.raises(PsvideoError, match="samples of 32 bits"):

@@ -44,7 +44,13 @@ def decode(path: Path) -> CodedPicture:
 
 
 def _parse_header(path: Path, data: bytes, tail: bytes) -> Header:
-    if len(data) < 33 or not data.startswith(SIGNATURE) or data[12:16] != b"IHDR":
+    whole = len(data) >= 33 and data.startswith(SIGNATURE) and data[12:16] == b"IHDR"
+    if not whole and data.startswith(SIGNATURE[:4]):
+        raise PsvideoError(
+            f"{path}: begins like a PNG file and does not go on like one: it is truncated or damaged, as by a transfer "
+            "that takes it for text and changes its line ends. Copy it again."
+        )
+    if not whole:
         raise PsvideoError(f"{path}: does not begin like a PNG file{begins_like(data)}.")
     if END not in tail:
         raise PsvideoError(f"{path}: ends before its last chunk (IEND): it is truncated. Copy it again.")
