@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.frame_rates import parse_fps
 from psvideo.formats.plan_toml import format_plan, parse_plan, read_plan
 from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig
@@ -276,6 +276,14 @@ def test_an_output_that_exists_is_refused_unless_forced(tmp_path: Path) -> None:
         refuse_existing(path, force=False)
     refuse_existing(path, force=True)
     assert [p.name for p in tmp_path.iterdir()] == ["plan.toml"]
+
+
+def test_an_output_below_a_file_is_refused_before_any_work(tmp_path: Path) -> None:
+    file = tmp_path / "take"
+    file.write_text("x")
+    for out in (file / "timing.json", file / "results" / "timing.json"):
+        with pytest.raises(UsageError, match="take is a file, and nothing can lie below it"):
+            refuse_existing(out, force=True)
 
 
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:

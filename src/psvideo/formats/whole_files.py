@@ -84,11 +84,14 @@ def is_drawn(path: Path) -> bool:
 
 
 def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:
-    """Raise UsageError where an output exists already and ``force`` does not allow to replace it; what earlier runs
-    that were killed left beside it is removed.
+    """Raise UsageError where an output exists already and ``force`` does not allow to replace it, or would lie below a
+    file; what earlier runs that were killed left beside it is removed.
 
     ``mark`` is a word that a file of this kind holds: what does not is not replaced, even with ``force``.
     """
+    above = next((one for one in path.absolute().parents if one.exists()), path.parent)
+    if above.is_file():
+        raise UsageError(f"{path}: {above} is a file, and nothing can lie below it. Name an output in a folder.")
     _remove_left(path)
     if not path.exists():
         return
