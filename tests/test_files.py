@@ -282,7 +282,7 @@ def test_an_output_below_a_file_is_refused_before_any_work(tmp_path: Path) -> No
     file = tmp_path / "take"
     file.write_text("x")
     for out in (file / "timing.json", file / "results" / "timing.json"):
-        with pytest.raises(UsageError, match="take is a file, and nothing can lie below it"):
+        with pytest.raises(UsageError, match="cannot be written, as"):
             refuse_existing(out, force=True)
 
 

@@ -236,10 +236,10 @@ def test_depth_of_what_moves_is_integrated_before_the_next_instant_is_followed(
         integrated[0] += 1
         return depth
 
-    def following(*given: Any) -> Any:
+    def following(*given: Any, **more: Any) -> Any:
         followed[0] += 1
         assert integrated[0] == max(followed[0] - 2, 0), "the first is integrated in another way, to fix the scale"
-        return followed_at(*given)
+        return followed_at(*given, **more)
 
     monkeypatch.setattr(depths, "depth_of", integrating)
     monkeypatch.setattr(rounds, "followed_at", following)

@@ -91,7 +91,7 @@ def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None
     """
     above = next((one for one in path.absolute().parents if one.exists()), path.parent)
     if above.is_file():
-        raise UsageError(f"{path}: {above} is a file, and nothing can lie below it. Name an output in a folder.")
+        raise UsageError(f"{path}: cannot be written, as {above} is a file. Name an output in a folder.")
     _remove_left(path)
     if not path.exists():
         return
