@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.arrays import Doubles, Integers
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import EDGES, Fit, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.misread import CLIPPED
 
 CLEAR = 30.0
 """Variances that a curve, or an exposure, must explain beyond what the other one does, to be needed beside it."""
@@ -33,9 +32,6 @@ PROBE = 1e-3
 """Share of the shortest flash by which times are moved, to see what that changes."""
 FAINT = 1e-4
 """Below this share of saturation a power is not followed: its logarithm has no end."""
-NOMINAL, OFTEN, BENT = 0.003, 0.25, 0.02
-"""Exposures and readouts are off from what plans say by about the first share of themselves, as those are that LED
-stripes show, by odds of the second to one; the third are a curve's odds, unless so much clips that this looks bent."""
 SAME = 1e-10
 """Steps that differ by less than this share of themselves are the same one."""
 
@@ -110,38 +106,16 @@ def maybe_otherwise_s(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     """Return by how much times are in doubt because exposure or readout, where they are not ``free`` in the fit, may be
     others than the plan's: the exposure explains more than a curve does, or what a curve leaves."""
     steps = _steps(plan, rows, fit, free)
-    others, beside_s = list[str](), _nominally_s(rows, fit.beat, steps, free)
+    others, beside_s = list[str](), 0.0
     if "exposure_s" not in free:
         exposed, bent, both = steps.taken([EXPOSURE]), steps.best([]), steps.best([EXPOSURE])
-        if both.gain - bent.gain > LIKELY:
-            beside_s = max(beside_s, abs(float(both.by[SHIFT] - bent.by[SHIFT])))
+        beside_s = abs(float(both.by[SHIFT] - bent.by[SHIFT])) if both.gain - bent.gain > LIKELY else 0.0
         others += ["exposure_s"] if exposed.gain > max(bent.gain, steps.taken([]).gain + LIKELY) else []
     if "row_time_s" not in free and steps.taken([ROW_TIME]).gain > steps.taken([]).gain + LIKELY:
         others.append("row_time_s")
     if not others:
         return beside_s
     return max(beside_s, rms_apart_s(rows, fit.beat, fitted(plan, rows, fit.beat, (*free, *others)).beat))
-
-
-def _nominally_s(rows: Profiles, beat: Beat, steps: "_Steps", free: tuple[str, ...]) -> float:
-    """Return by how much times are in doubt because exposure or readout may be as little off as plans usually are.
-
-    Where rows tell little of them, as where most pixels clip, such an error stays, and moves all flashes. Each is held
-    against the plan's value and against a curve by how likely the rows are under it (Jeffreys 1939).
-    """
-    plain = steps.taken([]).gain
-    bent = np.log(BENT) + 0.5 * (steps.best([]).gain - plain) if rows.clipped_share < CLIPPED else -np.inf
-    doubts_s = [0.0]
-    for name, place in (("exposure_s", EXPOSURE), ("row_time_s", ROW_TIME)):
-        off, variance, moved = steps.beside(place)
-        usual = (NOMINAL * getattr(beat, name)) ** 2
-        if name in free or usual == 0.0 or (off > 0.0 and place == EXPOSURE and beat.exposure_s >= rows.period_s):
-            continue
-        kept = usual / (usual + variance)
-        likely = np.log(OFTEN) + 0.5 * (np.log(variance / (usual + variance)) + kept * off**2 / variance)
-        share = float(np.exp(likely - np.logaddexp(likely, np.logaddexp(0.0, bent))))
-        doubts_s.append(float(abs(moved) * np.sqrt(share * ((kept * off) ** 2 + kept * variance))))
-    return max(doubts_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,22 +138,12 @@ class _Steps:
     def taken(self, more: Sequence[int]) -> _Step:
         """Return the best steps of the times that are free anyway, and of ``more``."""
         kept = np.array([*self.always, *more])
-        inverse = self._inverse(kept)
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.matrix)[kept], 1e-300))
+        scale = np.outer(unit, unit)
+        inverse = np.linalg.pinv(self.matrix[np.ix_(kept, kept)] * scale, rcond=SAME, hermitian=True) * scale
         by = np.zeros(len(self.pull))
         by[kept] = inverse @ self.pull[kept]
         return _Step(gain=float(by @ self.pull), by=by, variance=float(inverse[0, 0]))
-
-    def beside(self, place: int) -> tuple[float, float, float]:
-        """Return the step of one more time, its variance, and by how much all flashes move with it."""
-        kept, own = np.array(self.always), float(self.matrix[place, place])
-        along = self._inverse(kept) @ self.matrix[kept, place]
-        stiff = max(float(own - self.matrix[place, kept] @ along), SAME * own, 1e-300)
-        return float(self.pull[place] - self.pull[kept] @ along) / stiff, 1.0 / stiff, -float(along[SHIFT])
-
-    def _inverse(self, kept: Integers) -> Doubles:
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.matrix)[kept], 1e-300))
-        scale = np.outer(unit, unit)
-        return np.asarray(np.linalg.pinv(self.matrix[np.ix_(kept, kept)] * scale, rcond=SAME, hermitian=True) * scale)
 
     def best(self, more: Sequence[int]) -> _Step:
         """Return the best steps with a curve as well, of the fewest shapes that explain as much."""
