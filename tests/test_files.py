@@ -1,6 +1,7 @@
 """Plan, rig and timing files: what is written reads back equal, and what breaks the contract is said in a paragraph."""
 
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -139,6 +140,19 @@ def test_a_newer_major_version_is_refused_plainly() -> None:
 def test_every_mistake_is_named_at_once() -> None:
     with pytest.raises(PsvideoError, match=r"width_px.*duration_s"):
         parse_plan(MINIMAL.replace("width_px = 64", "width_px = -1").replace("duration_s = 0.001", "duration_s = 0"))
+
+
+def test_of_thousands_of_mistakes_the_first_are_named() -> None:
+    """A program that writes every flash wrong makes as many as there are flashes, and 20,000 took two minutes."""
+    head, _, _ = MINIMAL.partition("[[strobe.flash]]")
+    text = head + 20_000 * "[[strobe.flash]]\nduration_s = 0.001\n"
+    began_s = time.process_time()
+    with pytest.raises(PsvideoError) as fault:
+        parse_plan(text, source="plan.toml")
+    assert time.process_time() - began_s < 5
+    assert "key 'strobe.flash[1].lights' is missing" in str(fault.value)
+    assert str(fault.value).rstrip().endswith("and more like these.")
+    assert len(str(fault.value)) < 1000
 
 
 unit_vectors = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 1)).map(

@@ -1,4 +1,4 @@
-"""What is wrong with a file under contract, in words: every mistake of a validation in one paragraph."""
+"""What is wrong with a file under contract, in words: the mistakes of a validation in one paragraph."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,10 +7,17 @@ from pydantic import BaseModel, ValidationError
 
 from psvideo.errors import nearest
 
+MOST_SAID, LOOKED_AT = 12, 200
+"""So many mistakes are said, of so many that a validation finds first: a file that a program wrote wrong has as many as
+it has lines."""
+
 
 def mistakes_in_words(source: str, model: type[BaseModel], fault: ValidationError) -> str:
-    """Put every mistake of a validation into one paragraph."""
-    text = f"{source}: " + "; ".join(_mistake(model, error) for error in _one_a_key(fault.errors()))
+    """Put every mistake of a validation into one paragraph, of many the first."""
+    found = _one_a_key(fault.errors()[:LOOKED_AT])
+    text = f"{source}: " + "; ".join(_mistake(model, error) for error in found[:MOST_SAID])
+    if len(found) > MOST_SAID or fault.error_count() > LOOKED_AT:
+        text += "; and more like these"
     return text if text.endswith("?") else text + "."
 
 
