@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psvideo.errors import NoStrobeError
 from psvideo.model.arrays import Doubles
 from psvideo.model.first_light import check_first_light
-from psvideo.model.plan import Plan
+from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.model.units import counted
 from psvideo.sync.clip_parts import parts_of, timing_of_parts
@@ -66,7 +66,7 @@ def timing_from_rows(
         return synced_timing(plan, indices, clip=clip, dropped=dropped, first_light=first_light)
     rows = _to_fit(plan, indices, profiles, doubt, clip=clip)
     verdict = believed_fit(plan, rows)
-    _refuse_where_others_fit(plan, verdict, clip)  # of their parts, shorter ones show even less
+    _refuse_where_others_fit(plan, rows, verdict, clip)  # of their parts, shorter ones show even less
     take = FramesTaken(
         plan=plan,
         clip=clip,
@@ -119,13 +119,15 @@ def _to_fit(
 
 
 def _refuse_unless_believed(plan: Plan, rows: Profiles, verdict: Verdict, clip: str) -> None:
-    _refuse_where_others_fit(plan, verdict, clip)
+    _refuse_where_others_fit(plan, rows, verdict, clip)
     if not verdict.believed:
         raise NoStrobeError(_not_found(plan, rows, verdict.found, clip))
 
 
-def _refuse_where_others_fit(plan: Plan, verdict: Verdict, clip: str) -> None:
+def _refuse_where_others_fit(plan: Plan, rows: Profiles, verdict: Verdict, clip: str) -> None:
     if verdict.other is not None:
+        if abs(verdict.found.fit.beat.clock.mean_offset_ppm()) > UNKNOWN_CLOCK_PPM:  # another plan's, or strobe's
+            raise NoStrobeError(_not_found(plan, rows, verdict.found, clip))
         at_once = rows_open_at_once(plan, verdict.found.fit.beat)
         raise NoStrobeError(f"{clip}: {other_times_as_well(plan, verdict.found, verdict.other, at_once=at_once)}")
 
