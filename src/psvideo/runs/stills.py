@@ -114,7 +114,7 @@ def stills(
     asked = Asked(preset=preset, aov=aov, mesh=mesh, encode=encode, plates=plates)
     delivery, _ = delivery_of(asked)
     if path.is_dir():
-        find_stills(path)
+        find_stills(path)  # a folder without pictures is refused before balls are measured
     looking = looking_for(spheres, circle, focal_px, focal_mm, sensor_mm)
     known = _known_lights(
         path_if_given("lights", lights),

@@ -126,7 +126,7 @@ def _refuse_unless_believed(plan: Plan, rows: Profiles, verdict: Verdict, clip: 
 
 def _refuse_where_others_fit(plan: Plan, rows: Profiles, verdict: Verdict, clip: str) -> None:
     if verdict.other is not None:
-        if abs(verdict.found.fit.beat.clock.mean_offset_ppm()) > UNKNOWN_CLOCK_PPM:  # another plan's, or strobe's
+        if abs(verdict.found.fit.beat.clock.mean_offset_ppm()) > UNKNOWN_CLOCK_PPM:  # the strobe played another plan
             raise NoStrobeError(_not_found(plan, rows, verdict.found, clip))
         at_once = rows_open_at_once(plan, verdict.found.fit.beat)
         raise NoStrobeError(f"{clip}: {other_times_as_well(plan, verdict.found, verdict.other, at_once=at_once)}")

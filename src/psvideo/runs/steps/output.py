@@ -68,8 +68,14 @@ def _identity(take: Take) -> list[object]:
 
 def folder_of(output: Output) -> AbstractContextManager[Path]:
     """Return the block that writes the folder whole or not at all."""
-    asked = {"force": output.force, "resume": output.resume, "kept": output.kept}
-    return whole_folder(output.folder, mark=MARK, settings=output.settings, **asked)
+    return whole_folder(
+        output.folder,
+        mark=MARK,
+        force=output.force,
+        resume=output.resume,
+        settings=output.settings,
+        kept=output.kept,
+    )
 
 
 def begun_by(output: Output) -> AbstractContextManager[Path]:

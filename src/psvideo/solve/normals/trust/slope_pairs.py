@@ -62,7 +62,8 @@ def averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
 
 
 def pairs_of(normals: Floats, lengths: Floats, bright: Mask) -> SlopePairs | None:
-    """Return neighbours in the light of all lamps, None where there are too few."""
+    """Return neighbours in the light of all lamps, None where there are too few. ``lengths`` (2, row, col): the
+    logarithm of albedo down the columns and along the rows (``without_edges``)."""
     cols = bright.shape[1]
     over, beside = (np.flatnonzero(both) for both in _both(bright))
     first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
