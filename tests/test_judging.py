@@ -74,7 +74,7 @@ def judged(
     if unsure is not None:
         unsure[0, 0, 0] = 1e-6
     solved = solving.solve(plates, lit, mask=inside, unsure=unsure)
-    surface = solved if unchecked else judged_by_signs(*solving.measured(plates, lit, mask=inside))
+    surface = solved if unchecked else judged_by_signs(*solving.measured(plates, lit, mask=inside))[0]
     assert surface.error_deg is not None
     measured = solved.measured & inside
     apart = np.linalg.norm(surface.normals.astype(np.float64) - normals, axis=-1)[measured]
@@ -297,7 +297,7 @@ def test_waves_that_shine_are_off_by_no_more_than_twice_what_three_lights_claim_
     case = shot(*shapes()[1][1:], ring(3, 40), gloss=0.15)  # off by 6 degrees, and nothing is left over
     solving = Solving(error=True)
     surface = solving.solve(case.plates, case.lit, mask=case.mask)
-    by_signs = judged_by_signs(*solving.measured(case.plates, case.lit, mask=case.mask))
+    by_signs = judged_by_signs(*solving.measured(case.plates, case.lit, mask=case.mask))[0]
     assert surface.error_deg is not None
     off_deg = angles_deg(surface.normals[case.mask], case.truth[case.mask])
     claimed_deg = surface.error_deg[case.mask].astype(float)

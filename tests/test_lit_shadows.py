@@ -83,7 +83,7 @@ def test_under_nine_lights_none_is_left_out_since_a_byte_does_not_say_which() ->
     solved_, one, noise = solving.measured(
         plates, Illumination(directions=ways, intensities=np.ones((len(ways), 1))), mask=INSIDE
     )
-    doubted = replace(judged(solved_, one, noise), shadows_lit=1.0, valid=np.zeros_like(INSIDE))
+    doubted = replace(judged(solved_, one, noise)[0], shadows_lit=1.0, valid=np.zeros_like(INSIDE))
     assert doubted.error_deg is not None
     doubted.error_deg[:] = 20
     assert left_out(doubted, one, solved=solved_.valid) is None

@@ -9,5 +9,5 @@
 
 Near lights: ``near_surface`` solves normals and depth in turns; ``sweeping`` finds the distance by the lights' falloff
 (with ``falloff_costs``, ``sweeping_kernel`` and ``swept_outlines``). Over time: ``steady``, with ``steady_kernel``
-and ``steady_votes``, keeps the trust in a pixel from flickering.
+and ``steady_votes``, keeps the trust in a pixel from flickering, and ``at_rest`` says which rounds share their doubts.
 """

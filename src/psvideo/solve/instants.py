@@ -23,6 +23,7 @@ from psvideo.model.surface import Subject, Surface
 from psvideo.plates.align.denoise import Average, ResultNoise, added, averaged
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
+from psvideo.solve.at_rest import AtRest
 from psvideo.solve.depth import View, view_of
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
@@ -31,6 +32,7 @@ from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving, most_claimed_deg
 from psvideo.solve.normals.task import Samples
+from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of
 from psvideo.solve.steady import SHOWN, Steady, steadied
 from psvideo.solve.sweeping import swept
@@ -111,7 +113,8 @@ class _Given:
 
 @dataclass(kw_only=True)
 class _RoundSolver:
-    """What all rounds are solved with, and ``steady``: what is known of those before, which solving a round renews."""
+    """What all rounds are solved with; and ``steady`` and ``at_rest``, which are known of those before and renewed by
+    solving a round."""
 
     lights: Sequence[Light]
     view: View
@@ -122,6 +125,7 @@ class _RoundSolver:
     asked: AskedPasses
     one_by_one: bool
     steady: Steady | None = None
+    at_rest: AtRest | None = None
 
     @classmethod
     def of(
@@ -205,7 +209,14 @@ class _RoundSolver:
             lit = found
             return self.solving.solve(plates, found, seen=seen, mask=mask, unsure=unsure, moves=moves)
 
-        surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
+        if here is not None:
+            return solve_near(here, lambda ground: light(ground=ground), solve), lit
+        before = Doubts() if self.at_rest is None else self.at_rest.until(one)
+        surface, doubts = self.solving.solve_again(
+            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, before=before
+        )
+        alone = self.one_by_one or (self.masks is not None and self.masks.still is None)
+        self.at_rest = None if alone else AtRest.since(one, doubts)
         return surface, lit
 
 

@@ -20,6 +20,7 @@ from psvideo.solve.normals.robust.reflectance import LIGHTS_FOR_REFLECTANCE
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Looks, Samples, Usable
+from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import Judging, emptied, judged, with_unchecked
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
@@ -76,11 +77,26 @@ class Solving:
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments, and ``Evidence`` for
         what is unsure of the plates and ``moves``."""
+        return self.solve_again(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves)[0]
+
+    def solve_again(
+        self,
+        plates: Plates,
+        lit: Illumination,
+        *,
+        seen: Mask | None = None,
+        mask: Mask | None = None,
+        unsure: Floats | None = None,
+        moves: Mask | None = None,
+        before: Doubts = Doubts(),
+    ) -> tuple[Surface, Doubts]:
+        """Return the same, and how far it may be off beyond noise, with what was known of that ``before``, of rounds in
+        which everything stood as it does."""
         from psvideo.solve.filling.filled import filled
         from psvideo.solve.filling.leaving_out import left_out
 
         solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves)
-        known = judged(solved, one, noise)
+        known, doubts = judged(solved, one, noise, before=before)
         without = left_out(known, one, solved=solved.valid) if self.fill else None
         known = replace(
             known,
@@ -90,7 +106,7 @@ class Solving:
         valid = solved.valid
         del solved  # residuals that nobody asked for are gone with it
         whole = filled(known, one, solved=valid, noise=noise.dark, without=without) if self.fill else emptied(known)
-        return with_unchecked(whole, one, noise)
+        return with_unchecked(whole, one, noise), doubts
 
     def look(
         self,

@@ -11,5 +11,6 @@ shadows that pass for light (``lit_shadows``), ``near_spread`` (near lights, who
 ``moving_doubt`` (plates that do not match after alignment), ``few_checked`` (by how much a model of the subject would
 turn normals under four and five lights), and ``unchecked`` (what three lights leave of real surfaces, and show hardly
 anywhere; and how well few lights check each other). Loops of the signs are in ``signs_kernel``. ``doubting`` says how
-much each counts, and makes one doubt of them; its loop is ``doubting_kernel``.
+much each counts, and makes one doubt of them; its loop is ``doubting_kernel``. ``doubts`` are those of
+several looks at what stands still.
 """

@@ -17,6 +17,7 @@ from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.surface_bits import bits
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
+from psvideo.solve.normals.trust.doubts import Doubt, Doubts
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.noise_spread import NoiseSpread, Spreading
@@ -42,12 +43,13 @@ class Judging:
 
 
 MOST_USUAL_DEG = 30.0
-LIKELY_USUAL = np.float32(0.75)
-"""What is usual around a pixel lies so far from what it surely is to what it likely is."""
 
 
-def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()) -> Surface:
-    """Return the surface with ``error_deg`` of all that was solved, and ``valid`` where that is small enough.
+def judged(
+    surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging(), before: Doubts = Doubts()
+) -> tuple[Surface, Doubts]:
+    """Return the surface with ``error_deg`` of all that was solved, and ``valid`` where that is small enough; and its
+    doubts, with those ``before`` it where nothing changed since then.
 
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
@@ -55,28 +57,34 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     some = every_nth(surface, one.step_of(surface.valid.shape))
     spread = NoiseSpread.of(some, one, noise, how.spreading, near)
     points = spread.points(some)
-    turned_deg = moved_deg(points, one, noise)
-    signs = signs_of(points, one, turned_deg)
-    doubt, moving = doubt_deg(signs, how=how.doubting), None
-    if turned_deg is not None:
-        known = points.known.astype(np.float32)
-        check = checked(points, one, noise)
-        moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, check=check, how=how.moving)
-    nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
-    usual = np.float32(how.doubting.own) * nearly
-    at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0]
+    doubts, moving = before, None
+    if before.look_again or not before.looks:
+        found, moving = _found(points, one, noise, how)
+        doubts = before.and_of(found)
+    shown = doubts.mean
+    at_points = spread.judged(points.surface, np.stack([shown.doubt_deg, shown.usual_deg]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit
     if misfit is not None and points.known.any():
-        misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, signs.lost_deg), near, how)
+        misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, shown.lost_deg), near, how)
+    doubt = shown.doubt_deg
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
-    doubt = np.stack([doubt, usual])
+    doubt = np.stack([doubt, shown.usual_deg])
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
-    by_slope_deg = np.broadcast_to(np.float32(signs.by_slope_deg), points.known.shape)
-    slope_deg = _usual(by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
-    return replace(
-        surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg, shadows_lit=signs.shadows_lit
-    )
+    slope_deg = _usual(shown.by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
+    lit = shown.shadows_lit
+    return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg, shadows_lit=lit), doubts
+
+
+def _found(points: ThinSurface, one: Evidence, noise: PlateNoise, how: Judging) -> tuple[Doubt, Floats | None]:
+    """Return what signs make of the points, and by how much motion may turn them, None where nothing moved."""
+    turned_deg = moved_deg(points, one, noise)
+    signs = signs_of(points, one, turned_deg)
+    if turned_deg is None:
+        return Doubt.of(signs, how.doubting), None
+    known, check = points.known.astype(np.float32), checked(points, one, noise)
+    moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, check=check, how=how.moving)
+    return Doubt.of(signs, how.doubting), moving
 
 
 def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise) -> Surface:

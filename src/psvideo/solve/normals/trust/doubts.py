@@ -1,0 +1,69 @@
+"""What signs come to: how far normals may be off beyond noise, as one look or several at the same surface show it.
+
+Looks at what stands still differ by noise alone. Their mean is nearer than each of them, and moves by a share of it
+only when one takes the place of another.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from psvideo.model.arrays import Floats
+from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
+from psvideo.solve.normals.trust.signs import Signs
+
+LIKELY_USUAL = np.float32(0.75)
+"""What is usual around a pixel lies so far from what it surely is to what it likely is."""
+POOLED_LOOKS = 4
+"""The mean is of this many looks, the last ones."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """What one look shows, (row, col) of the points, in degrees: how far normals may be off beyond noise, and what of
+    it is usual around them; the others as in ``Signs``."""
+
+    doubt_deg: Floats
+    usual_deg: Floats
+    lost_deg: Floats
+    by_slope_deg: Floats
+    shadows_lit: float
+
+    @classmethod
+    def of(cls, signs: Signs, how: Doubting) -> "Doubt":
+        """Return what signs come to."""
+        nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
+        return cls(
+            doubt_deg=doubt_deg(signs, how=how),
+            usual_deg=np.float32(how.own) * nearly,
+            lost_deg=signs.lost_deg,
+            by_slope_deg=np.broadcast_to(np.float32(signs.by_slope_deg), nearly.shape),
+            shadows_lit=signs.shadows_lit,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubts:
+    """The last ``looks`` at a surface since anything changed, and whether to ``look_again`` rather than go by them."""
+
+    looks: tuple[Doubt, ...] = ()
+    look_again: bool = True
+
+    def and_of(self, look: Doubt) -> "Doubts":
+        """Return the last looks, another one among them."""
+        return Doubts(looks=(*self.looks, look)[-POOLED_LOOKS:])
+
+    @cached_property
+    def mean(self) -> Doubt:
+        """What the looks show together."""
+        return self.looks[0] if len(self.looks) == 1 else _mean(self.looks)
+
+
+def _mean(looks: Sequence[Doubt]) -> Doubt:
+    mean: dict[str, Any] = {
+        one.name: sum(getattr(look, one.name) for look in looks) / np.float32(len(looks)) for one in fields(Doubt)
+    }
+    return Doubt(**mean | {"shadows_lit": float(mean["shadows_lit"])})
