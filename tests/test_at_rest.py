@@ -19,6 +19,7 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import POOLED_ROUNDS, Round
 from psvideo.solve.at_rest import LOOKS_EVERY
 from psvideo.solve.instants import surfaces
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.trust import judging, signs
 from psvideo.solve.normals.trust.doubts import POOLED_LOOKS, Doubt, Doubts
 
@@ -125,7 +126,8 @@ def look(value: float) -> Doubt:
 def test_doubts_are_the_mean_of_the_last_looks() -> None:
     doubts = Doubts()
     for value in (9.0, 1.0, 2.0, 3.0, 6.0):
-        doubts = doubts.and_of(look(value))
+        doubts = doubts.and_of(look(value), PlateNoise(read=value, photon=0.0))
+    assert doubts.noise == PlateNoise(read=6.0, photon=0.0)
     assert len(doubts.looks) == POOLED_LOOKS
     np.testing.assert_allclose(doubts.mean.doubt_deg, 3)
     np.testing.assert_allclose(doubts.mean.usual_deg, 6)

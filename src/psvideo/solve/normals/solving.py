@@ -95,7 +95,9 @@ class Solving:
         from psvideo.solve.filling.filled import filled
         from psvideo.solve.filling.leaving_out import left_out
 
-        solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves)
+        solved, one, noise = self.measured(
+            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, noise=before.known_noise
+        )
         known, doubts = judged(solved, one, noise, before=before)
         without = left_out(known, one, solved=solved.valid) if self.fill else None
         known = replace(
@@ -137,9 +139,11 @@ class Solving:
         mask: Mask | None = None,
         unsure: Floats | None = None,
         moves: Mask | None = None,
+        noise: PlateNoise | None = None,
     ) -> tuple[Surface, Evidence, PlateNoise]:
-        """Return every pixel that three measurements solve, well or not, and what it is judged by."""
-        noise = noise_of(plates, lit)
+        """Return every pixel that three measurements solve, well or not, and what it is judged by; ``noise`` is that of
+        the plates, where it is known."""
+        noise = noise_of(plates, lit) if noise is None else noise
         usable = _usable(noise, lit, self.method(len(plates)))
         one = Evidence(
             plates=plates,

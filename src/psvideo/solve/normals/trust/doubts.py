@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from psvideo.model.arrays import Floats
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.signs import Signs
 
@@ -47,14 +48,21 @@ class Doubt:
 
 @dataclass(frozen=True, kw_only=True)
 class Doubts:
-    """The last ``looks`` at a surface since anything changed, and whether to ``look_again`` rather than go by them."""
+    """The last ``looks`` at a surface since anything changed, the ``noise`` of the last one's plates, None before the
+    first, and whether to ``look_again`` rather than go by them."""
 
     looks: tuple[Doubt, ...] = ()
+    noise: PlateNoise | None = None
     look_again: bool = True
 
-    def and_of(self, look: Doubt) -> "Doubts":
+    @property
+    def known_noise(self) -> PlateNoise | None:
+        """The noise of plates that need not be looked at again; None where they need."""
+        return None if self.look_again else self.noise
+
+    def and_of(self, look: Doubt, noise: PlateNoise) -> "Doubts":
         """Return the last looks, another one among them."""
-        return Doubts(looks=(*self.looks, look)[-POOLED_LOOKS:])
+        return Doubts(looks=(*self.looks, look)[-POOLED_LOOKS:], noise=noise)
 
     @cached_property
     def mean(self) -> Doubt:

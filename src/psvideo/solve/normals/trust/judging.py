@@ -60,7 +60,7 @@ def judged(
     doubts, moving = before, None
     if before.look_again or not before.looks:
         found, moving = _found(points, one, noise, how)
-        doubts = before.and_of(found)
+        doubts = before.and_of(found, noise)
     shown = doubts.mean
     at_points = spread.judged(points.surface, np.stack([shown.doubt_deg, shown.usual_deg]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit
