@@ -140,6 +140,18 @@ def test_what_is_named_instead_of_what_was_meant_is_answered_by_what_to_name(
     assert not (tmp_path / "o").exists()
 
 
+@pytest.mark.parametrize("name", ["--take3", "-take3"])
+def test_a_folder_called_like_an_option_is_told_how_to_name_it(
+    name: str, clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: Callable[..., str]
+) -> None:
+    shutil.copytree(clip, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    words = said("info", name, status=2)
+    assert f"{name} is a file or folder here, and what begins with - is read as an option; name it ./{name}." in words
+    said("info", f"./{name}", status=0)
+    assert "No such option: --take4" in said("info", "--take4", status=2)
+
+
 Spoil = Callable[[Path, Path], None]
 
 

@@ -116,6 +116,23 @@ def test_where_a_mask_cuts_through_a_body_light_goes_on_and_nothing_is_said() ->
     assert outward(thin_surface(surface), thinned(strip), thinned(strip).astype(np.float32)) is not None
 
 
+@pytest.mark.parametrize("unseen", [slice(80, 120), slice(0, 90)])
+def test_where_rows_end_that_some_frame_saw_a_subject_does_not(unseen: slice) -> None:
+    """A bust was called a rig of exchanged lights at a shutter of 270 degrees: its outline ran along the rows that no
+    frame saw, at a mean cosine of 0.37."""
+    ways = ring(4, 30)
+    normals, inside = ball()
+    seen = inside & ~np.isin(np.arange(SIZE), np.arange(SIZE)[unseen])[:, None]
+    plates, surface = solved((normals, seen), ways, ways)
+    of_all, shown = thinned(np.max(plates, axis=0)), thinned(seen | ~inside)
+    cut = outward(thin_surface(surface), thinned(seen), of_all)
+    right = outward(thin_surface(surface), thinned(seen), of_all, shown)
+    assert cut is not None
+    assert cut.cosine < 0.9
+    assert right is not None
+    assert right.cosine > 0.95
+
+
 def said_of(shape: tuple[Array, Mask], ways: Array, claimed: Array, *, guessed: bool = False) -> Judgement:
     """Return the line on the rig."""
     plates, surface = solved(shape, ways, claimed)

@@ -82,6 +82,22 @@ def test_check_and_the_whole_run_say_the_same_of_rows_that_come_from_other_round
     assert f"about {100 * (1 - seen / len(places)):.0f} % of a round's rows" in said[0]
 
 
+def test_a_take_too_short_to_show_all_rows_below_360_degrees_is_told_so_and_a_longer_one_is_not() -> None:
+    """A check said that nothing was lost where normals then lacked a third of the rows: rounds lasted 4.005 frames."""
+    plan = plan_of(["a"], mode="rolling", dark_s=0.01)
+    plan = replace(plan, dark_s=0.01005 - plan.flashes[0].duration_s)
+    said = []
+    for take_s in (0.2, 20.0):
+        lines = of_rows.coverage(
+            plan, timing_of(exposure_s=0.005), Footage(borrowed=0.4, unseen=0.4).observed(0), take_s=take_s
+        )
+        said.append(next(one for one in lines if one.subject == "rows"))
+    assert "see a light in no round of so short a take" in said[0].found
+    assert said[0].advice == "Shoot at 360 degrees, or film longer."
+    assert "so short a take" not in said[1].found
+    assert said[1].advice == "Shoot at 360 degrees."
+
+
 def test_what_to_do_about_missing_frames_fits_movies_too() -> None:
     """A phone's movie of a variable frame rate was to be copied again from a faster card."""
     timing = timing_of(dropped_frames=(DroppedFrames(after=3, count=1),))

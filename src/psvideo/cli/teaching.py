@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Mapping, Sequence, Set
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -71,13 +72,20 @@ def _with_the_nearest(message: str) -> str:
     return f"{message.rstrip('.')}; {meant}" if meant.endswith("?") else message
 
 
-def _refuse_other_names(args: Sequence[str], known: Set[str]) -> None:
-    """Raise where an option is typed under a name that it has elsewhere; what follows ``--`` is no option."""
+def _refuse_no_options(args: Sequence[str], known: Set[str]) -> None:
+    """Raise where an option is typed under a name that it has elsewhere, or a file's name looks like one; what
+    follows ``--`` is no option."""
     typed = args[: args.index("--")] if "--" in args else args
     for name in (word.partition("=")[0] for word in typed):
         meant = OTHER_NAMES.get(name)
         if meant in known and name not in known:
             raise typer.BadParameter(f"there is no option {name}; did you mean {meant}?")
+    for word in typed:  # as a shell's * hands them on
+        if word.startswith("-") and word.partition("=")[0] not in known and word != "-" and Path(word).exists():
+            raise typer.BadParameter(
+                f"{word} is a file or folder here, and what begins with - is read as an option; name it "
+                f"{shlex.quote(f'./{word}')}."
+            )
 
 
 class Teaching(TyperCommand):
@@ -95,7 +103,7 @@ class Teaching(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words typed; what a beginner leaves out, or calls by another name, is explained."""
-        _refuse_other_names(args, {name for param in self.params for name in param.opts})
+        _refuse_no_options(args, {name for param in self.params for name in param.opts})
         try:
             return list(super().parse_args(ctx, args))
         except typer.BadParameter as fault:

@@ -1,6 +1,6 @@
 """Judgements on rows and frames: rows that nobody saw, or under two flashes, and frames that are missing or repeat."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from psvideo.model.cost.in_step import IN_STEP, blind_share, dark_s_out_of_step, frames_in_step, never_shown
@@ -161,8 +161,8 @@ def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
             subject="rows",
             grade="doubtful",
             found=f"{opened.capitalize()}: about {100 * share:.0f} % of a round's rows come from other rounds. What "
-            f"stands still loses nothing by it, what moves in them is left out.{_lacking(rounds)}",
-            advice="Shoot at 360 degrees.",
+            f"stands still loses nothing by it, what moves in them is left out.{_lacking(rows)}",
+            advice="Shoot at 360 degrees" + (", or film longer." if _too_short(rows) else "."),
         )
     elif unseen > MOST_UNSEEN:
         yield Judgement(
@@ -173,8 +173,19 @@ def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
         )
 
 
-def _lacking(rounds: Sequence[float]) -> str:
+def _too_short(rows: _Rows) -> bool:
+    """Return whether a take of which only the start was looked at is too short to show all rows."""
+    return not rows.rounds and rows.unseen > MOST_UNSEEN
+
+
+def _lacking(rows: _Rows) -> str:
     """Say how many rounds lack rows that no other round shows, nothing where none does."""
+    rounds = rows.rounds
+    if _too_short(rows):
+        return (
+            f" Beyond these, about {100 * rows.unseen:.0f} % see a light in no round of so short a take: flashes fall "
+            "at nearly the same rows from round to round."
+        )
     lack = sum(one > MOST_UNSEEN for one in rounds)
     if not lack:
         return ""

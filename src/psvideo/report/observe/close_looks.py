@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 
+import numpy as np
+
 from psvideo.model.surface import Surface
 from psvideo.plates.sequence import Round
 from psvideo.report.observe.against_noise import AgainstNoise, against_noise
@@ -77,7 +79,7 @@ class CloseLooks:
 
     def look_at_outline(self, some: Surface, seen: Seen) -> None:
         """Look whether normals face outwards where the subject ends; ``some`` is the surface, thinned."""
-        faces = outward(some, seen.subject, seen.bright.max(axis=0))
+        faces = outward(some, seen.subject, seen.bright.max(axis=0), np.asarray(seen.shown.all(axis=0)))
         self.outward += [] if faces is None else [faces]
 
     def look_into_shadow(self, surface: Surface, seen: Seen, points: RigPoints) -> None:

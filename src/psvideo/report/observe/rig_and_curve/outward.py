@@ -42,20 +42,27 @@ class Facing:
     apart: float
 
 
-def outward(some: Surface, subject: NDArray[np.bool_], light: NDArray[np.float32]) -> Facing | None:
+def outward(
+    some: Surface,
+    subject: NDArray[np.bool_],
+    light: NDArray[np.float32],
+    shown: NDArray[np.bool_] | None = None,
+) -> Facing | None:
     """Return how steep normals at the subject's outline face. The mean cosine to the way out is 1 for a body that
     stands free, about 0 under lights that are exchanged, -1 for a bowl. A rig that is wrong turns normals that were
     alike alike, so that those of one way out still are; a bowl beside a body has both there, 1 apart at most. None
     where too little of an outline shows.
 
     some: a surface, thinned as the ``subject`` (row, col) is, and the brightest ``light`` of any lamp (row, col). Where
-    the picture ends the subject does not.
+    the picture ends the subject does not, nor where rows end that are ``shown`` (row, col) under all lights.
     """
     away, right, up = _ways_out(subject)
     slope = np.hypot(right, up)
     normals = some.normals.astype(np.float32)
     leaning = np.hypot(normals[..., 0], normals[..., 1])
     rim = subject & some.measured & (away <= NEAR) & (slope > CLEAR)
+    if shown is not None:
+        rim &= _far_from_unseen(shown)
     rim[rim] = _ends(light, rim, right[rim] / slope[rim], up[rim] / slope[rim])
     at = rim & (leaning > STEEP)
     if at.sum() < max(LEAST_POINTS, LEAST_SHARE * rim.sum()):
@@ -83,6 +90,12 @@ def _ends(
     beyond = np.rint(rows - BEYOND * up).astype(np.intp), np.rint(cols + BEYOND * right).astype(np.intp)
     there = light[tuple(np.clip(at, 0, size - 1) for at, size in zip(beyond, light.shape, strict=True))]
     return np.asarray(there < np.float32(DARKER) * light[rows, cols])
+
+
+def _far_from_unseen(shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which points have none near them that some light does not show."""
+    reach = 2 * int(BEYOND) + 1
+    return np.asarray(cv2.erode(shown.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0)
 
 
 def _ways_out(subject: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
