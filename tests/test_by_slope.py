@@ -134,6 +134,26 @@ def test_under_lights_that_check_each_other_residuals_say_it() -> None:
     assert 0.4 < shown / true < 2.5
 
 
+def test_two_neighbouring_lamps_that_disagree_do_not_say_that_normals_are_off() -> None:
+    """The one number that four lights leave over is what the two differ by, which hardly turns normals."""
+    around, slant = np.radians([0, 15, 140, 250]), np.radians(40)
+    ways = np.stack([np.cos(around) * np.sin(slant), np.sin(around) * np.sin(slant), np.full(4, np.cos(slant))], axis=1)
+    for shade, strengths in ((matte, (1.05, 0.95, 1, 1)), (sheen, (1, 1, 1, 1)), (sheen, (1.05, 0.95, 1, 1))):
+        case = shot(ways, shade, strengths=strengths, said=(1, 1, 1, 1))
+        found = Solving(error=True).solve(case.plates, case.lit, mask=case.mask)
+        assert found.error_deg is not None
+        measured = found.source == MEASURED
+        off, said = angles_deg(found.normals[measured], case.truth[measured]), found.error_deg[measured]
+        if shade is matte:
+            assert np.median(off) < 1
+            assert np.median(said) < 4, "6 where only that number counts"
+            assert found.valid[measured].mean() > 0.9
+        else:
+            assert np.median(off) > 8
+            assert np.mean(off <= 2 * said) > 0.85
+            assert found.valid[measured].mean() < 0.05, "albedo shows a sheen, whatever is left over"
+
+
 @pytest.mark.parametrize("lights", [4, 5, 6, 8])
 def test_light_that_all_lamps_of_a_ring_add_shows_in_albedo_however_many_they_are(lights: int) -> None:
     """To the last one they take it for normals that face the lens more, and leave nothing over."""

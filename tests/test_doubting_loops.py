@@ -154,6 +154,16 @@ def torn_in_numpy(points: ThinSurface) -> np.ndarray:
 
 
 def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
+    beside = alone_in_numpy(signs, how)
+    if not signs.unsaid:
+        return beside
+    alone, known = alone_in_numpy(replace(signs, by_slope_deg=0.0), how), signs.noise_deg > 0
+    shown = np.median(np.broadcast_to(signs.by_slope_deg, SHAPE)[known]) / signs.unsaid
+    share = np.clip((how.albedo_times * shown / np.median(alone[known])) ** signs.unsaid, how.albedo_least, 1)
+    return np.asarray(beside + signs.in_light * (np.maximum(share * alone, signs.by_slope_deg) - beside))
+
+
+def alone_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
     def of(misfit_deg: np.ndarray, torn_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         counts = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
         misfit = counts * misfit_deg ** (1 + how.misfit_power)
@@ -186,7 +196,8 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
         assert seen == pytest.approx(getattr(true, name), rel=1e-3, abs=2e-3), name
         assert name == "uneven" or seen[points.known].max() > 0.05, name
     for how in (Doubting(), Doubting(misfit_power=0.3, torn=1.0)):
-        for unchecked in (0.0, np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)):
+        rising = np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)
+        for unchecked, unsaid in ((0.0, 0.0), (0.0, 0.4), (rising, 0.0), (rising, 0.4), (rising, 1.0)):
             counted, share = 3 * unchecked, np.asarray(unchecked, np.float32) / np.float32(9)
             signs, of_numpy = (
                 replace(
@@ -195,6 +206,8 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
                     by_model_deg=counted,
                     torn_share=share,
                     by_slope_deg=unchecked,
+                    unsaid=unsaid,
+                    in_light=np.linspace(0, 1, SHAPE[0], dtype=np.float32)[:, None] * np.ones(SHAPE, np.float32),
                     by_length_deg=unchecked,
                 )
                 for each in (found, true)

@@ -57,9 +57,9 @@ def by_slope_deg(
     unseen: float = 1.0,
     added: Sequence[Added] = (),
     modelled_deg: float = 0.0,
-) -> Floats:
+) -> Floats | None:
     """Return by how many degrees normals are turned, as far as albedo that goes with the slope shows it, (row, col) of
-    the points, of which these ``known`` speak for the subject; zeros where too few of them are in the light of all
+    the points, of which these ``known`` speak for the subject; None where too few of them are in the light of all
     lamps. What turns normals counts as far as residuals leave it ``unseen`` (``unchecked.py``), or light that all lamps
     ``added`` alike (``added_light.py``), where that is more; a model of the subject turned normals by
     ``modelled_deg``."""
@@ -67,7 +67,7 @@ def by_slope_deg(
     bright = in_light_of_all(normals, albedo, lit, whole)
     pairs = pairs_of(normals, without_edges(points.brightness, known), bright) if bright.any() else None
     if pairs is None:
-        return np.zeros(known.shape, np.float32)
+        return None
     shown = np.zeros(known.shape, np.float32)
     if unseen:
         typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs, lit)))

@@ -4,11 +4,19 @@ How much each of the signs (``signs.py``) counts was fitted to objects whose nor
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from psvideo.compute.ranks import median
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.trust.signs import Signs
+
+if TYPE_CHECKING:
+    from psvideo.solve.normals.trust.doubting_kernel import Factors
+
+LEAST_DEG = 0.3
+"""Where normals are doubted by less, nothing needs albedo to say so."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +40,10 @@ class Doubting:
     length, length_beside, length_from_deg: how much it counts where albedo and residuals stand out together, and up to
         how many times of what all the rest is beyond some degrees: where nothing else speaks against a surface, edges
         of paint and shadows are as good as it is.
+    albedo_times, albedo_least: where four lights hardly check each other, residuals and torn normals together
+        typically count up to so many times what albedo shows, but for no less than this share; and albedo counts where
+        it shows more than all of them: both where all lamps reach, or shadows are black. One number that is left over
+        says now a third, now three times what normals are off by; what albedo shows strays half as far.
 
     Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and virtual shapes of eight materials and under wrong rigs, under 5 to 96 lights, spread
@@ -53,6 +65,8 @@ class Doubting:
     length: float = 2.0
     length_beside: float = 4.0
     length_from_deg: float = 2.0
+    albedo_times: float = 2.0
+    albedo_least: float = 0.5
 
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
@@ -73,10 +87,35 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     planes[kernel.LOST], planes[kernel.NOISE] = signs.lost_deg, signs.noise_deg
     planes[kernel.UNEVEN] = signs.uneven
     planes[kernel.AT_LEAST] = np.float32(how.by_model) * signs.by_model_deg
-    planes[kernel.BESIDE_MISFIT] = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
-    doubt = np.empty(planes.shape[1:], np.float32)
+    by_albedo_deg = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
+    planes[kernel.BESIDE_MISFIT] = by_albedo_deg
     factors = kernel.Factors(*np.array(counts, np.float32))
-    kernel.fill_doubt(planes.reshape(len(planes), -1), factors, doubt.reshape(-1))
+    doubt = _of_planes(planes, factors, signs, how)
+    if not signs.unsaid:
+        return doubt
+    planes[kernel.BESIDE_MISFIT] = 0
+    alone = _of_planes(planes, factors, signs, how)
+    either = np.maximum(_beside_albedo(signs, alone, how) * alone, by_albedo_deg)
+    return np.asarray(doubt + signs.in_light * (either - doubt), np.float32)
+
+
+def _of_planes(planes: Floats, factors: "Factors", signs: Signs, how: Doubting) -> Floats:
+    """Return what planes of signs make, and pixels that are off by themselves."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_doubt
+
+    doubt = np.empty(planes.shape[1:], np.float32)
+    fill_doubt(planes.reshape(len(planes), -1), factors, doubt.reshape(-1))
     own_deg = np.maximum(np.float32(how.length_beside) * (doubt - np.float32(how.length_from_deg)), np.float32(0))
     own_deg = np.minimum(np.float32(how.length) * signs.by_length_deg, own_deg)
     return np.asarray(np.hypot(doubt, own_deg), np.float32)
+
+
+def _beside_albedo(signs: Signs, doubt: Floats, how: Doubting) -> np.float32:
+    """Return how much of itself a doubt counts beside what albedo that goes with the slope typically shows, as far as
+    the residual does not say it."""
+    known = signs.noise_deg > 0
+    if not known.any():
+        return np.float32(1)
+    shown = how.albedo_times / signs.unsaid * median(np.broadcast_to(signs.by_slope_deg, doubt.shape)[known])
+    share = (shown / max(median(doubt[known]), LEAST_DEG)) ** signs.unsaid
+    return np.float32(min(max(share, how.albedo_least), 1.0))

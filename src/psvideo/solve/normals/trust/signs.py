@@ -32,6 +32,7 @@ from psvideo.solve.normals.trust.torn import torn_angles_deg
 from psvideo.solve.normals.trust.unchecked import (
     ALL_EXPLAINED,
     FEW_LIGHTS,
+    reached_by_all,
     torn_share,
     turned_unseen,
     unseen_share,
@@ -52,8 +53,11 @@ times, five and six of them, or four, or four where albedo by slope counts as we
 much more. Over 490 sets of 4 to 8 lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go
 with that measure to the powers 0.4 to 0.6 (half of this one is used, ``few_power``), and not with the lights' condition
 number. More would trust less that is wrong, and claim medians that are over 1.5 times too large."""
-WHOLE = ("hidden", "plain", "shadows_lit")
+WHOLE = ("hidden", "plain", "shadows_lit", "unsaid")
 """What ``Signs`` says of all points at once."""
+ONE_LEFT = ALL_EXPLAINED + 1
+"""This many lights leave one number over, and albedo says more of how far normals are off. (Under five and six two and
+four points more would be trusted, and of Washington's sphere 6 % over 10 degrees instead of 1.)"""
 LEAST_UNREACHED = 0.02
 """Light from around is known where at least this many lights, in the mean, do not reach a point."""
 
@@ -73,8 +77,10 @@ class Signs:
     ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals under four and five
     lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
     shows it, under lights that can hardly be held against each other (``by_slope.py``); ``by_colour_deg`` as its
-    colour does (``by_colour.py``). ``shadows_deg``: by how much they may be where a shadow that is lit from around
-    passes for light (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1.
+    colour does (``by_colour.py``). ``unsaid``: how far the one residual of four such lights does not say it, 0 to 1,
+    where albedo does; ``in_light``: where it does, 0 to 1, since all lamps reach or shadows are black.
+    ``shadows_deg``: by how much they may be where a shadow that is lit from around passes for light
+    (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1.
     ``by_length_deg``: by how much albedo and residuals stand out together beyond what is usual around a point
     (``by_length.py``)."""
 
@@ -93,6 +99,8 @@ class Signs:
     torn_share: Floats | float = 0.0
     by_slope_deg: Floats | float = 0.0
     by_colour_deg: Floats | float = 0.0
+    unsaid: float = 0.0
+    in_light: Floats | float = 1.0
     shadows_deg: Floats | float = 0.0
     shadows_lit: float = 0.0
     by_length_deg: Floats | float = 0.0
@@ -132,6 +140,10 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     turned_by_it_deg = modelled_deg(points, one, still) if added else 0.0
     shadows = shadows_of(points, one.lit, still) if unseen else LitShadows(np.zeros_like(noise), 0.0)
     by_model = turned_by_model_deg(points.surface, points.step, one, still)
+    slope = None
+    if unseen or added:
+        slope = by_slope_deg(points, one.lit, still, unseen=unseen, added=added, modelled_deg=turned_by_it_deg)
+    unsaid = unseen if plain and lights == ONE_LEFT and slope is not None else 0.0
     return Signs(
         misfit_deg=misfit_deg,
         likely_misfit_deg=likely_deg,
@@ -145,10 +157,10 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,
         torn_share=torn_share(points, one.lit),
-        by_slope_deg=by_slope_deg(points, one.lit, still, unseen=unseen, added=added, modelled_deg=turned_by_it_deg)
-        if unseen or added
-        else 0.0,
+        by_slope_deg=0.0 if slope is None else slope,
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
+        unsaid=unsaid,
+        in_light=1 - np.float32(shadows.lit) * (1 - reached_by_all(points, one.lit)) if unsaid else 1.0,
         shadows_deg=np.float32(unseen) * shadows.off_deg,
         shadows_lit=shadows.lit,
         by_length_deg=0.0 if one.moved else by_length_deg(points, squares, noise),

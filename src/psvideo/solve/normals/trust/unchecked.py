@@ -66,10 +66,15 @@ def torn_share(points: ThinSurface, lit: Illumination) -> Floats | float:
     unseen = unseen_share(lit)
     if not unseen:
         return 0.0
+    return np.asarray(np.float32(unseen) / (1 + (TORN_IN_LIGHT - 1) * reached_by_all(points, lit)), np.float32)
+
+
+def reached_by_all(points: ThinSurface, lit: Illumination) -> Floats:
+    """Return whether all lights surely reach every point, 0 to 1, (row, col)."""
     cosines = (towards(points, lit) * points.planes).sum(axis=1)
     mean = np.maximum(cosines, 0).mean(axis=0)
     reaches = (cosines.min(axis=0) / np.maximum(mean, np.float32(1e-6)) - DIM) / (BRIGHT - DIM)
-    return np.asarray(np.float32(unseen) / (1 + (TORN_IN_LIGHT - 1) * np.clip(reaches, 0, 1)), np.float32)
+    return np.asarray(np.clip(reaches, 0, 1), np.float32)
 
 
 def towards(points: ThinSurface, lit: Illumination) -> Floats:
