@@ -119,6 +119,15 @@ def test_where_the_other_lights_lie_in_one_plane_that_is_said_and_not_that_norma
     assert "line on lights first" in first_of_all((line,))
 
 
+def test_a_dead_lights_name_is_a_guess_where_the_order_is() -> None:
+    """Check and normals blamed two lamps for the same clip: each had guessed another order."""
+    dead = Footage(lights=6, gains=[1, 1, 0, 1, 1, 1], solved=True).observed(0)
+    (line,) = judge_lamps(dead, guessed=True)
+    assert line.found.endswith("come from the other 5. As the order is a guess, it may be another one.")
+    several = Footage(lights=6, gains=[1, 1, 0, 0, 1, 1], solved=True).observed(0)
+    assert next(judge_lamps(several, guessed=True)).found.endswith("As the order is a guess, they may be others.")
+
+
 def test_many_dead_lights_are_one_line() -> None:
     (line,) = lamps(Footage(lights=10, gains=[1, 1, 0, 1, 0, 0, 0, 0, 1, 1], solved=True).observed(0))
     assert line.found == (

@@ -37,6 +37,15 @@ def judgements(
     if not observed.facts:
         return on_time
     exposed = (saturation,) if saturation else tuple(exposure(observed, under=ceiling_of(plan.camera.encoding)))
+    fired = tuple(
+        lamps(
+            observed,
+            timed=all(one.grade == "good" for one in on_time),
+            missed=in_step(plan, timing),
+            guessed=timing.order == "guess",
+            swing=timing.swing,
+        )
+    )
     lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt))
     return (
         *on_time,
@@ -44,19 +53,16 @@ def judgements(
         *coverage(plan, timing, observed, take_s=take_s),
         *exposed,
         *([levels] if levels else []),
-        *lamps(
-            observed,
-            timed=all(one.grade == "good" for one in on_time),
-            missed=in_step(plan, timing),
-            swing=timing.swing,
-        ),
+        *fired,
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),
         *lit,
         *accuracy(observed),
         *distance(observed),
-        *validity(observed, first=first_of_all((*exposed, *lit), curve_doubted=bool(curve_doubt or timing.half))),
+        *validity(
+            observed, first=first_of_all((*exposed, *fired, *lit), curve_doubted=bool(curve_doubt or timing.half))
+        ),
         *what_moves(observed.facts, aligned=aligned),
         *steadiness(observed.facts),
     )

@@ -27,11 +27,17 @@ MISSED = 0.5
 
 
 def lamps(
-    observed: Observed, *, timed: bool = True, missed: bool = False, swing: Swing | None = None
+    observed: Observed,
+    *,
+    timed: bool = True,
+    missed: bool = False,
+    guessed: bool = False,
+    swing: Swing | None = None,
 ) -> Iterator[Judgement]:
     """Judge whether every lamp gives light, always, and steadily; where flash times are not known (``timed``), only
-    whether it does at all. ``missed``: the camera may be blind whenever one lamp flashes. ``swing`` is how the clip's
-    light grows and shrinks: no lamp is blamed for what whole frames do."""
+    whether it does at all. ``missed``: the camera may be blind whenever one lamp flashes; ``guessed``: which light is
+    which is a guess. ``swing`` is how the clip's light grows and shrinks: no lamp is blamed for what whole frames
+    do."""
     facts = known_rounds(observed)
     if not facts:
         return
@@ -42,7 +48,7 @@ def lamps(
     named = [light for light, is_known in zip(observed.lights, known, strict=True) if is_known]
     flat = _in_a_plane(observed)
     shown_as = brightest_parts(observed)[known], claimed_by_rig(observed)[known]
-    said = list(weak_lamps(named, relative[known], *shown_as, missed=missed, flat=flat))
+    said = list(weak_lamps(named, relative[known], *shown_as, missed=missed, flat=flat, guessed=guessed))
     alive = observed.firing
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():

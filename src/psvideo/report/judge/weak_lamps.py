@@ -40,8 +40,10 @@ def weak_lamps(
     *,
     missed: bool = False,
     flat: bool = False,
+    guessed: bool = False,
 ) -> Iterator[Judgement]:
-    """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
+    """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough.
+    ``guessed``: which light is which is a guess."""
     dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
     weak = [light for light, share, is_dim in zip(lights, relative, dim, strict=True) if is_dim and share >= NOT_FIRING]
     if len(weak) > NAMED:
@@ -57,7 +59,7 @@ def weak_lamps(
     others = int((relative >= NOT_FIRING).sum())
     dead = [(light, share) for light, share in zip(lights, relative, strict=True) if share < NOT_FIRING]
     if dead:
-        yield _no_light(dead, others=others, missed=missed, flat=flat)
+        yield _no_light(dead, others=others, missed=missed, flat=flat, guessed=guessed)
     weaker = _weaker(relative, brightest, claimed)
     for light, share, is_dim, is_weaker, says in zip(lights, relative, dim, weaker, claimed, strict=True):
         if is_weaker:
@@ -82,9 +84,9 @@ def _weaker_than_rig(light: str, share: float, says: float, *, lights: int) -> J
     )
 
 
-def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool, flat: bool) -> Judgement:
+def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool, flat: bool, guessed: bool) -> Judgement:
     """Say which lamps do not fire, which is bad where too few others do, or those lie in one plane (``flat``);
-    ``missed``: rows see them in no round."""
+    ``missed``: rows see them in no round, ``guessed``: their names are a guess."""
     enough = others >= LEAST_LIGHTS
     rest = f"; normals come from the other {others}." if enough else "."
     if flat:
@@ -95,6 +97,8 @@ def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool, f
     what = f"The light {named} gives no light ({most})"
     if not one:
         what = f"{len(dead)} lights give no light ({named}; at most {most})"
+    if guessed:
+        rest += f" As the order is a guess, {'it may be another one' if one else 'they may be others'}."
     return Judgement(
         subject="lights",
         grade="doubtful" if enough and not flat else "bad",
