@@ -33,11 +33,13 @@ BESIDE_CLIPPED = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Ends:
-    """The two plates that an instant is made from; one of them may be gone."""
+    """The two plates that an instant is made from; one of them may be gone. ``shifts`` is how far to the right and down
+    the whole picture is in either, as a share of its width and its height: the camera shook."""
 
     before: LightPlate | None
     after: LightPlate | None
     share: float
+    shifts: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
 
     @property
     def nearer(self) -> LightPlate:
@@ -67,8 +69,8 @@ def plate_at(
     rows, cols = own.shape[:2]
     share = float(np.clip(ends.share, 0, 1))
     sides = [
-        None if plate is None else _Side.of(plate, motion, max(counts, 1e-6))
-        for plate, counts in ((ends.before, 1 - share), (ends.after, share))
+        None if plate is None else _Side.of(plate, motion, max(counts, 1e-6), shift)
+        for plate, counts, shift in zip((ends.before, ends.after), (1 - share, share), ends.shifts, strict=True)
     ]
     packing, seen = Packing.of(own.shape), np.empty((rows, cols), np.bool_)
     sources, columns = (source, source if guess is None else guess), columns_in(cols, source.shape[1])
@@ -94,16 +96,18 @@ def plate_at(
 class _Side:
     """A plate, of whose picture only those rows are made that move into a band, what it counts where both plates are
     taken, and what lies well within what was seen, by rows, (row, 1) or (1, col), or by pixels; (1, 1) where that is
-    everywhere."""
+    everywhere. The whole picture is ``right`` and ``down`` of where it is to be, in pixels."""
 
     plate: LightPlate
     read: Reader
     span_s: float
     counts: np.float32
     within: Flags
+    right: float
+    down: float
 
     @classmethod
-    def of(cls, plate: LightPlate, motion: Followed, counts: float) -> "_Side":
+    def of(cls, plate: LightPlate, motion: Followed, counts: float, shift: tuple[float, float]) -> "_Side":
         own = plate.own.astype(np.uint8)
         within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)).reshape(own.shape) > 0
         return cls(
@@ -112,13 +116,15 @@ class _Side:
             span_s=motion.time_s - plate.time_s,
             counts=np.float32(counts),
             within=np.ones((1, 1), np.bool_) if within.all() else within,
+            right=shift[0] * plate.shape[1],
+            down=shift[1] * plate.shape[0],
         )
 
     def around(self, band: range, velocity: Floats) -> "_Rows":
         """Return the plate's rows of a band, and those that move into it."""
         rows, high = self.plate.shape[0], self.plate.shape[0] / velocity.shape[1]
         some = velocity[1, max(int(band.start / high) - 1, 0) : int(band.stop / high) + 2]
-        ways = self.span_s * high * np.array([some.min(), some.max(), 0], np.float64)
+        ways = self.span_s * high * np.array([some.min(), some.max(), 0], np.float64) - self.down
         first = max(math.floor(band.start - ways.max()) - MARGIN_ROWS, 0)
         last = min(math.ceil(band.stop - ways.min()) + MARGIN_ROWS, rows)
         first, last = min(first, band.start), max(last, band.stop)
@@ -140,7 +146,8 @@ class _Rows:
         """Return what a compiled loop takes of them, where both plates together count ``total``."""
         side, full = self.side, np.float32(self.side.plate.saturation)
         span_s, share = np.float32(side.span_s), side.counts / total
-        return SideArrays(_flat(self.light), self.first, self._marks(), side.within, span_s, share, full)
+        beside = np.float32(side.right), np.float32(side.down)
+        return SideArrays(_flat(self.light), self.first, self._marks(), side.within, span_s, share, full, *beside)
 
     def _marks(self) -> Codes8:
         """Return what is clipped and what lies beside that, (row, col), or one 0 where nothing is."""

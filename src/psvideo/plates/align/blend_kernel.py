@@ -147,8 +147,9 @@ def blend_rows(
         for plane in range(2):
             start, each, scale = (np.float32(left), ONE, wide) if plane == 0 else (y, ZERO, high)
             above, under = lines[2 * plane + (top & 1), left:right], lines[2 * plane + (below & 1), left:right]
-            _places(above, under, down, scale, start, each, one.span_s, ways[plane, left:right])
-            _places(above, under, down, scale, start, each, two.span_s, ways[2 + plane, left:right])
+            early_at, late_at = (one.right, two.right) if plane == 0 else (one.down, two.down)
+            _places(above, under, down, scale, start + early_at, each, one.span_s, ways[plane, left:right])
+            _places(above, under, down, scale, start + late_at, each, two.span_s, ways[2 + plane, left:right])
         for begin in range(left, right, EIGHT):
             end = min(begin + EIGHT, right)
             what = _alike(own, other, small_row, owns[begin], owns[end - 1])

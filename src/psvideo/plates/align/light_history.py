@@ -168,6 +168,11 @@ class Held:
             raise ValueError(f"light {light} of instant {instant.number} is still to come")
         return around
 
+    def plates_of(self, instant: DueInstant) -> list[LightPlate]:
+        """Return the plates of lights under which something moves that an instant is made from, of those held."""
+        around = [self.sure_around(light, instant) for light in instant.moving]
+        return [shot.plate for one in around for shot in (one.before, one.after) if shot.plate is not None]
+
     def moved_since(self, light: str, round_number: int) -> bool | None:
         """Return whether a light's plate shows motion since that of the round before; None where one of them is not
         there or no flow is asked for."""

@@ -99,7 +99,7 @@ def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
     plates = _compared(pair, ways, motion.step)
     alike, own_alike = plates.evenly & ~plates.shaded, plates.own_evenly & ~plates.shaded
     source = _shown_by(plates, motion, nearer=BEFORE if spans_s[0] <= spans_s[1] else AFTER, guessed=guessed)
-    gone = [_outside(way) for way in ways]
+    gone = [outside(way) for way in ways]
     for covered, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
         _add_hidden(covered, motion, alike, span_s, sum(spans_s))
     source[gone[0] & ~gone[1]] = AFTER
@@ -224,7 +224,8 @@ def _along(codes: Codes8, way: Floats) -> Codes8:
     return np.asarray(cv2.remap(codes, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
-def _outside(way: Floats) -> Flags:
+def outside(way: Floats) -> Flags:
+    """Return what came from beyond the picture, by how far every pixel went, (2, row, col)."""
     rows, cols = way.shape[1:]
     x, y = pixel_places(rows, cols)
     x, y = x - way[0], y - way[1]

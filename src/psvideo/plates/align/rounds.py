@@ -31,6 +31,7 @@ from psvideo.plates.align.light_history import Around, DueInstant, Held
 from psvideo.plates.align.own_ways import along_own_ways
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
+from psvideo.plates.align.shake.steadied import Steadied, steady_at
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
@@ -195,7 +196,12 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     """Make the plates of all lights under which something moves; each is let go as soon as it was used."""
     lights = [light for light in held.lights if light in instant.moving]
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
+    steady = steady_at(held, instant, pairs)
+    if steady is not None:
+        pairs = [steady.pair(pair) for pair in pairs]
     instant.motion = motion = followed_at(pairs, instant.time_s, others=len(held.lights) - len(lights))
+    if steady is not None:
+        instant.motion = motion = replace(motion, carried=steady.per_s(motion.step))
     shown = over_ranges(lambda n, _: taken_of(pairs[n], motion, guessed=instant.guessed), len(pairs), each=1)
     guesses = sources = [one.source for one in shown]
     unknown = np.zeros_like(motion.moves)
@@ -209,10 +215,12 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
         unknown, guesses = unknown & ~kept.stands, [one.source for one in shown]
     instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
     instant.unsure[:, unknown] = UNKNOWN
-    own = held.own_flows.of(dict(zip(lights, pairs, strict=True))) if instant.guessed else dict[str, OwnFlow]()
+    own = dict[str, OwnFlow]()
+    if instant.guessed and steady is None:
+        own = held.own_flows.of(dict(zip(lights, pairs, strict=True)))
     for light, source, guess in zip(lights, sources, guesses, strict=True):
         around = held.sure_around(light, instant)
-        plate = _moved_to(around, source, guess, motion, held.put_by)
+        plate = _moved_to(around, (source, guess), motion, steady, held.put_by)
         if light in own and around.before.plate is not None and around.after.plate is not None:
             ends = around.before.plate, around.after.plate
             plate = along_own_ways(plate, ends, own[light], motion, put_by=held.put_by)
@@ -288,11 +296,18 @@ def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: S
     return unsure
 
 
-def _moved_to(around: Around, source: Codes8, guess: Codes8, motion: Followed, put_by: PutBy | None) -> LightPlate:
+def _moved_to(
+    around: Around, sources: tuple[Codes8, Codes8], motion: Followed, steady: Steadied | None, put_by: PutBy | None
+) -> LightPlate:
     before, after = around.before, around.after
     share = (motion.time_s - before.time_s) / (after.time_s - before.time_s)
-    ends = Ends(before=before.plate, after=after.plate, share=share)
-    return plate_at(ends, source, motion, number=after.round, guess=guess, put_by=put_by)
+    ends, times_s = Ends(before=before.plate, after=after.plate, share=share), (before.time_s, after.time_s)
+    if steady is not None:
+        ends = replace(ends, shifts=steady.shifts(*times_s))
+        there = before.plate is not None, after.plate is not None
+        taken, shown = (steady.source(one, motion, times_s, there) for one in sources)
+        sources = taken, shown
+    return plate_at(ends, sources[0], motion, number=after.round, guess=sources[1], put_by=put_by)
 
 
 def _hand_on(instant: DueInstant, plate: LightPlate) -> None:

@@ -36,14 +36,15 @@ class SideArrays(NamedTuple):
     span_s: np.float32  # how long ago it flashed, below 0: in so long
     counts: np.float32  # what it counts where both are taken
     full: np.float32  # from which value on it is clipped
+    right: np.float32 = ZERO  # how far its picture lies to the right of where it is to be
+    down: np.float32 = ZERO  # the same downwards
 
 
 @FUSED.inlined
 def lent_side(side: SideArrays) -> SideArrays:
     """The same without reference counts."""
-    return SideArrays(
-        lent(side.light), side.first, lent(side.marks), lent(side.seen), side.span_s, side.counts, side.full
-    )
+    light, marks, seen = lent(side.light), lent(side.marks), lent(side.seen)
+    return SideArrays(light, side.first, marks, seen, side.span_s, side.counts, side.full, side.right, side.down)
 
 
 @FUSED.inlined

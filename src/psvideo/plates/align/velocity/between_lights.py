@@ -49,7 +49,7 @@ class BetweenLights:
 
         def sharpen(place: int, _: int) -> None:
             before, after = codes[order[place]]
-            details[place] = _detail(before if first[order[place]] else after)
+            details[place] = edges_of(before if first[order[place]] else after)
 
         over_ranges(sharpen, len(codes), each=1)
         return cls(details=details, since_s=since_s[order], shape=shape)
@@ -79,7 +79,7 @@ class BetweenLights:
         return out
 
 
-def _detail(codes: Codes8) -> Codes8:
+def edges_of(codes: Codes8) -> Codes8:
     """Return edges of paint and shape, whatever the light on them, in codes."""
     smooth = np.asarray(cv2.GaussianBlur(codes.astype(np.float32), (0, 0), SMOOTH_PX), np.float32)
     level = np.log(light_of(smooth) + np.float32(2 * TOE))

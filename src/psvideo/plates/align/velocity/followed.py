@@ -24,7 +24,8 @@ class Followed:
     """``velocity`` (2, row, col) is x right, y down, in its own pixels per second, 0 where not ``moves``. ``rests``
     (row, col) is what clearly stands beside that; the rest looks alike either way. ``unchanged`` (row, col) is
     under how many of all lights a pixel that does not move shows the same before and after. Each of these pixels is
-    ``step`` by ``step`` of the sketches'."""
+    ``step`` by ``step`` of the sketches'. ``carried`` is how fast a camera that shakes shifts all of the picture, x and
+    y in its own pixels per second; the velocity is what comes on top."""
 
     time_s: float
     velocity: Floats
@@ -32,6 +33,7 @@ class Followed:
     rests: Flags
     unchanged: NDArray[np.int16] = field(default_factory=lambda: np.zeros((1, 1), np.int16))
     step: int = 1
+    carried: tuple[float, float] = (0.0, 0.0)
 
     @functools.cached_property
     def nearby(self) -> Floats:

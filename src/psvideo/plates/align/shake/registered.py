@@ -1,0 +1,78 @@
+"""By how much one picture is shifted against another, as a whole: phase correlation, then steps of Lucas and Kanade.
+
+B. D. Lucas and T. Kanade, "An Iterative Image Registration Technique with an Application to Stereo Vision", IJCAI 1981,
+here on detail of paint and shape, with weights that leave out what does not fit: what moves by itself, and shadows.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from psvideo.model.arrays import Doubles, Floats
+
+STEPS, SMALL_PX = 8, 0.004
+"""So many steps at most, until one is smaller than the second."""
+ODD = np.float32(20.0)
+"""What differs by so many codes of detail counts a quarter."""
+MARGIN_PX = 8
+"""What lies so near to the border may come from beyond it."""
+FARTHEST = 0.1
+"""Nothing is shifted by more than this share of the picture's shorter side between two flashes."""
+LEAST = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shift:
+    """Things of one picture are so far to the right and down in the other, ``px`` (2,); how ``alike`` both are then, a
+    correlation; and how much of them is ``unlike``, 0 to 1."""
+
+    px: Doubles
+    alike: float
+    unlike: float
+
+
+def shifted(picture: Floats, px: Doubles, fill: int = cv2.BORDER_REPLICATE) -> Floats:
+    """Return a picture whose things are so far (2,) to the right and down."""
+    way = np.array([[1, 0, px[0]], [0, 1, px[1]]], np.float64)
+    return np.asarray(cv2.warpAffine(picture, way, picture.shape[::-1], flags=cv2.INTER_LINEAR, borderMode=fill))
+
+
+def registered(one: Floats, other: Floats) -> Shift:
+    """Return the shift between two pictures of detail, around 0, (row, col), the likelier of two: what is found from
+    none, and from where phases correlate."""
+    window = cv2.createHanningWindow(one.shape[::-1], cv2.CV_32F)
+    start, _ = cv2.phaseCorrelate(one, other, window)
+    starts = [np.zeros(2)]
+    if 0.5 < np.abs(start).max() < FARTHEST * min(one.shape):
+        starts.append(np.array(start, np.float64))
+    found = [_refined(one, other, start) for start in starts]
+    return min(found, key=lambda shift: shift.unlike)
+
+
+def _refined(one: Floats, other: Floats, start_px: Doubles) -> Shift:
+    px, inner = start_px, (slice(MARGIN_PX, -MARGIN_PX),) * 2
+    own = one[inner]
+    own_across, own_down = _slopes(one)
+    for _ in range(STEPS):
+        back = shifted(other, -px)
+        theirs = _slopes(back)
+        across, down = (own_across + theirs[0])[inner] / 2, (own_down + theirs[1])[inner] / 2
+        left = own - back[inner]
+        weight = np.square(1 / (1 + np.square(left / ODD)))
+        slopes = across * weight, down * weight
+        square = np.array([[np.vdot(a, b) for b in (across, down)] for a in slopes], np.float64)
+        step = np.linalg.solve(square + LEAST * np.eye(2), [float(np.vdot(a, left)) for a in slopes])
+        px = px + np.clip(step, -2, 2)
+        if np.abs(step).max() < SMALL_PX or np.abs(px).max() > FARTHEST * min(one.shape):
+            break
+    back = shifted(other, -px)[inner]
+    sizes = float(np.sqrt(float(np.vdot(own, own)) * float(np.vdot(back, back)))) + LEAST
+    square = np.square(own - back)
+    unlike = float(np.mean(square / (square + ODD * ODD)))
+    return Shift(px=px, alike=float(np.vdot(own, back)) / sizes, unlike=unlike)
+
+
+def _slopes(picture: Floats) -> tuple[Floats, Floats]:
+    across, down = (cv2.Sobel(picture, cv2.CV_32F, *way, scale=1 / 8) for way in ((1, 0), (0, 1)))
+    return np.asarray(across, np.float32), np.asarray(down, np.float32)

@@ -1,0 +1,171 @@
+"""A camera that shakes shifts the whole picture, by another amount at every flash; plates are brought together."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.model.rig import Light
+from psvideo.plates.align.as_they_are import Lamps
+from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.align.shake.camera_path import CameraPath, camera_path
+from psvideo.plates.align.velocity.flow import sketch_of
+from psvideo.plates.align.velocity.followed import Pair
+from psvideo.plates.align.velocity.vectors import fill_per_s
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.plates.sequence import Round
+
+ROWS, COLS, ROUND_S = 128, 176, 1.0
+AROUND_PX = 40
+"""So much more of the scene lies around the picture, for it to shift."""
+NOISE = 0.003
+Way = Callable[[float], tuple[float, float]]
+
+
+def trembles(time_s: float) -> tuple[float, float]:
+    """Where the picture is, right and down: up to 3 px off, forth and back in 1.4 rounds."""
+    return 3 * math.sin(4.4 * time_s + 0.5), 2 * math.cos(6.1 * time_s)
+
+
+def goes(time_s: float) -> tuple[float, float]:
+    return 14 * time_s, 5 * time_s
+
+
+def lights_of(count: int) -> tuple[Light, ...]:
+    """So many lights around the camera, each other one a little higher."""
+    lights = []
+    for n in range(count):
+        azimuth, height = 2 * math.pi * n / count + 0.3, math.radians(50 + 8 * (-1) ** n)
+        x, y, z = math.cos(azimuth) * math.cos(height), math.sin(azimuth) * math.cos(height), math.sin(height)
+        lights.append(Light(name=f"l{n}", direction=(x, y, z)))
+    return tuple(lights)
+
+
+def relief(light: Light, painted: bool) -> NDArray[np.float32]:
+    """A relief of hills under a light, as wide and high as the picture and what lies around; painted or bare."""
+    rng, size = np.random.default_rng(3), (ROWS + 2 * AROUND_PX, COLS + 2 * AROUND_PX)
+    hills, paint = (cv2.GaussianBlur(rng.normal(size=size), (0, 0), spread) for spread in (9, 2))
+    slopes = [0.35 * slope / slope.std() for slope in np.gradient(hills)]
+    normals = np.stack([-slopes[1], slopes[0], np.ones(size)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    albedo = 0.5 + 0.12 * np.clip(paint / paint.std(), -2, 2) if painted else np.full(size, 0.6)
+    assert light.direction is not None
+    return np.asarray(albedo * np.maximum(normals @ np.array(light.direction), 0), np.float32)
+
+
+def seen_at(light: Light, px: Sequence[float], painted: bool) -> NDArray[np.float32]:
+    """What the camera sees of it where the picture is so far to the right and down."""
+    shift = np.array([[1, 0, px[0] - AROUND_PX], [0, 1, px[1] - AROUND_PX]], np.float64)
+    return np.asarray(cv2.warpAffine(relief(light, painted), shift, (COLS, ROWS), flags=cv2.INTER_CUBIC), np.float32)
+
+
+def flash_s(light: int, count: int) -> float:
+    """When a light flashes after a round's middle; behind the last one is a dark slot."""
+    return ROUND_S / (count + 1) * (light - (count - 1) / 2)
+
+
+def plates_of(count: int, way: Way, *, rounds: int = 3, painted: bool = True, moves: bool = False) -> list[LightPlate]:
+    """Plates of rounds 0 and later, whose middles lie one second apart; ``moves``: a disc goes by before the relief,
+    which the camera's ``way`` does not shift."""
+    plates, rng = [], np.random.default_rng(8)
+    for number in range(rounds):
+        for n, light in enumerate(lights_of(count)):
+            time_s = number * ROUND_S + flash_s(n, count)
+            image = seen_at(light, (0, 0) if moves else way(time_s), painted)
+            if moves:
+                y, x = np.mgrid[:ROWS, :COLS]
+                right, down = way(time_s)
+                inside = np.hypot(x - right - COLS / 2, y - down - ROWS / 2) < 26
+                image = np.where(inside, 0.8 * seen_at(light, (right + 11, down), painted), image)
+            image = np.asarray(image + NOISE * rng.normal(size=image.shape), np.float32)
+            plates.append(
+                LightPlate(
+                    light=light.name, number=number, time_s=time_s, picture=mixture_of(image), seen=np.ones(ROWS, bool)
+                )
+            )
+    return plates
+
+
+def path_of(
+    count: int, way: Way, *, painted: bool = True, known: bool = True, moves: bool = False
+) -> CameraPath | None:
+    """The path about the middle of round 1."""
+    plates = plates_of(count, way, painted=painted, moves=moves)
+    sketches = {(one.light, one.number): sketch_of(one, white=0.8) for one in plates}
+    pairs = []
+    for n, light in enumerate(lights_of(count)):
+        first = 0 if flash_s(n, count) > 0 else 1
+        pairs.append(Pair(before=sketches[light.name, first], after=sketches[light.name, first + 1]))
+    names = [light.name for light in lights_of(count)]
+    return camera_path(pairs, Lamps.of(lights_of(count), names) if known else None)
+
+
+def worst_px(path: CameraPath, way: Way) -> float:
+    """How far any two flashes' places are off each other."""
+    off = np.array([np.array(way(time_s)) for time_s in path.times_s]) - path.places_px
+    return float(np.abs(off - off.mean(axis=0)).max())
+
+
+@pytest.mark.parametrize("painted", [True, False], ids=["painted", "bare"])
+@pytest.mark.parametrize("count", [4, 6])
+def test_known_lights_show_where_the_picture_was_at_every_flash(count: int, painted: bool) -> None:
+    path = path_of(count, trembles, painted=painted)
+    assert path is not None
+    assert len(path.times_s) == 2 * count
+    assert worst_px(path, trembles) < 0.25
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_paint_shows_it_where_lights_are_not_known(count: int) -> None:
+    path = path_of(count, trembles, known=False)
+    assert path is not None
+    assert worst_px(path, trembles) < 0.4
+
+
+def test_shading_that_seems_shifted_under_every_light_is_not_taken_for_a_shake() -> None:
+    """Bare relief under lights that are not known: pictures of two lights fit each other best some pixels off."""
+    assert path_of(5, trembles, painted=False, known=False) is None
+
+
+@pytest.mark.parametrize("way", [goes, lambda _: (0.0, 0.0)], ids=["one velocity", "rest"])
+def test_a_camera_that_stands_or_goes_on_evenly_does_not_shake(way: Way) -> None:
+    assert path_of(5, way) is None
+
+
+def test_what_trembles_before_a_wall_that_stands_is_no_shake_of_the_camera() -> None:
+    assert path_of(5, trembles, moves=True) is None
+
+
+def brought(count: int, align: str, *, known: bool = True) -> Round:
+    how = Aligning(align="auto" if align == "auto" else "none", lights=lights_of(count) if known else ())
+    names = tuple(light.name for light in lights_of(count))
+    return next(one for one in aligned(plates_of(count, trembles), names, how, first=0) if one.number == 1)
+
+
+@pytest.mark.parametrize(("count", "known"), [(4, True), (6, True), (3, False)])
+def test_plates_of_a_camera_that_shakes_show_the_picture_of_one_instant(count: int, known: bool) -> None:
+    one, inner = brought(count, "auto", known=known), np.s_[8:-8, 8:-8]
+    off = {}
+    for align, shown in (("auto", one), ("none", brought(count, "none"))):
+        true = [seen_at(light, trembles(ROUND_S), True) for light in lights_of(count)]
+        both = [np.square(plate.image - image)[inner] for plate, image in zip(shown.plates, true, strict=True)]
+        off[align] = float(np.sqrt(np.mean(both)))
+    assert off["auto"] < off["none"] / 3
+    assert all(plate.pixels_seen[inner].all() for plate in one.plates)
+
+
+def test_what_left_the_picture_of_both_plates_is_not_known() -> None:
+    for plate, light in zip(brought(4, "auto").plates, lights_of(4), strict=True):
+        wrong = np.abs(plate.image - seen_at(light, trembles(ROUND_S), True)) > 0.1
+        assert not (wrong & plate.pixels_seen)[:, :4].any()
+
+
+def test_motion_vectors_of_a_camera_that_shakes_are_how_its_picture_goes() -> None:
+    one, planes = brought(5, "auto"), np.empty((2, ROWS, COLS), np.float32)
+    fill_per_s(one.motion, planes)
+    later, sooner = (np.array(trembles(ROUND_S + by)) for by in (1 / 12, -1 / 12))
+    np.testing.assert_allclose(np.median(planes, axis=(1, 2)), (later - sooner) * 6, atol=3)
