@@ -12,6 +12,7 @@ from psvideo.model.rig import Light
 from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.shake.camera_path import CameraPath, camera_path
+from psvideo.plates.align.shake.registered import registered
 from psvideo.plates.align.velocity.flow import sketch_of
 from psvideo.plates.align.velocity.followed import Pair
 from psvideo.plates.align.velocity.vectors import fill_per_s
@@ -138,6 +139,16 @@ def test_a_camera_that_stands_or_goes_on_evenly_does_not_shake(way: Way) -> None
 
 def test_what_trembles_before_a_wall_that_stands_is_no_shake_of_the_camera() -> None:
     assert path_of(5, trembles, moves=True) is None
+
+
+def test_two_pictures_are_registered_and_left_as_they_are() -> None:
+    """Also those whose sides OpenCV need not pad before it transforms them."""
+    wide = cv2.GaussianBlur(np.random.default_rng(4).normal(0, 200, (144, 180)), (0, 0), 2).astype(np.float32)
+    one, other = wide[8:136, 8:168].copy(), wide[5:133, 12:172].copy()
+    before = one.copy(), other.copy()
+    np.testing.assert_allclose(registered(one, other).px, (-4, 3), atol=0.01)
+    np.testing.assert_array_equal(one, before[0])
+    np.testing.assert_array_equal(other, before[1])
 
 
 def brought(count: int, align: str, *, known: bool = True) -> Round:

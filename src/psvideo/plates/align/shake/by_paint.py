@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Doubles, Floats
-from psvideo.plates.align.shake.registered import registered, shifted
+from psvideo.plates.align.shake.registered import correlation, registered, shifted
 
 SAME_PX, OTHER_PX, SMOOTH_PX = 0.05, 0.15, 3.0
 """Shifts are known to the first between plates of one light, to the second between those of two that are wholly alike,
@@ -60,6 +60,4 @@ def _from_to(count: int, first: int, last: int) -> Doubles:
 
 def _alike(one: Floats, other: Floats, px: Doubles) -> float:
     """Return how alike two pictures are, the other one shifted back: a correlation."""
-    back = shifted(other, -px)
-    sizes = float(np.sqrt(float(np.vdot(one, one)) * float(np.vdot(back, back))))
-    return float(np.vdot(one, back)) / max(sizes, 1e-6)
+    return correlation(one, shifted(other, -px))

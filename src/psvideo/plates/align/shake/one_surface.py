@@ -75,7 +75,7 @@ class OneSurface:
             weight = np.square(1 / (1 + np.square(own / MATTE)))
             each = slopes * np.repeat(odd, 2).astype(np.float32)[:, None] / mean
             square += (each * weight) @ each.T
-            wanted -= (each * weight) @ own
+            wanted -= np.einsum("ip,p->i", each * weight, own)  # BLAS would cut sums by threads
         square += DAMPING * np.trace(square) / len(square) * np.eye(len(square))
         step = np.linalg.solve(square, wanted).reshape(-1, 2)
         return np.asarray(np.clip(step - step.mean(axis=0), -LONGEST_PX, LONGEST_PX), np.float64)

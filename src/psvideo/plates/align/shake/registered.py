@@ -19,7 +19,7 @@ MARGIN_PX = 8
 """What lies so near to the border may come from beyond it."""
 FARTHEST = 0.1
 """Nothing is shifted by more than this share of the picture's shorter side between two flashes."""
-LEAST = 1e-6
+HALF, LEAST = np.float32(0.5), 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ def registered(one: Floats, other: Floats) -> Shift:
     """Return the shift between two pictures of detail, around 0, (row, col), the likelier of two: what is found from
     none, and from where phases correlate."""
     window = cv2.createHanningWindow(one.shape[::-1], cv2.CV_32F)
-    start, _ = cv2.phaseCorrelate(one, other, window)
+    start, _ = cv2.phaseCorrelate(one * window, other * window)  # given the window, it would put it on the pictures
     starts = [np.zeros(2)]
     if 0.5 < np.abs(start).max() < FARTHEST * min(one.shape):
         starts.append(np.array(start, np.float64))
@@ -57,20 +57,29 @@ def _refined(one: Floats, other: Floats, start_px: Doubles) -> Shift:
     for _ in range(STEPS):
         back = shifted(other, -px)
         theirs = _slopes(back)
-        across, down = (own_across + theirs[0])[inner] / 2, (own_down + theirs[1])[inner] / 2
+        across, down = HALF * (own_across + theirs[0])[inner], HALF * (own_down + theirs[1])[inner]
         left = own - back[inner]
-        weight = np.square(1 / (1 + np.square(left / ODD)))
+        weight = np.square(np.float32(1) / (1 + np.square(left / ODD))).astype(np.float32)
         slopes = across * weight, down * weight
-        square = np.array([[np.vdot(a, b) for b in (across, down)] for a in slopes], np.float64)
-        step = np.linalg.solve(square + LEAST * np.eye(2), [float(np.vdot(a, left)) for a in slopes])
+        square = np.array([[_summed(a, b) for b in (across, down)] for a in slopes], np.float64)
+        step = np.linalg.solve(square + LEAST * np.eye(2), [_summed(a, left) for a in slopes])
         px = px + np.clip(step, -2, 2)
         if np.abs(step).max() < SMALL_PX or np.abs(px).max() > FARTHEST * min(one.shape):
             break
     back = shifted(other, -px)[inner]
-    sizes = float(np.sqrt(float(np.vdot(own, own)) * float(np.vdot(back, back)))) + LEAST
-    square = np.square(own - back)
-    unlike = float(np.mean(square / (square + ODD * ODD)))
-    return Shift(px=px, alike=float(np.vdot(own, back)) / sizes, unlike=unlike)
+    apart = np.square(own - back)
+    unlike = float(np.mean(apart / (apart + ODD * ODD)))
+    return Shift(px=px, alike=correlation(own, back), unlike=unlike)
+
+
+def correlation(one: Floats, other: Floats) -> float:
+    """Return how alike two pictures of detail are, -1 to 1."""
+    return _summed(one, other) / (float(np.sqrt(_summed(one, one) * _summed(other, other))) + LEAST)
+
+
+def _summed(one: Floats, other: Floats) -> float:
+    """Return the sum of a product; BLAS would cut it by threads."""
+    return float(np.sum(one * other, dtype=np.float64))
 
 
 def _slopes(picture: Floats) -> tuple[Floats, Floats]:
