@@ -30,7 +30,7 @@ from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_timing import timing_and_order
 from psvideo.report.judge.of_validity import first_of_all
 from psvideo.report.judge.powers import power_words
-from psvideo.report.judge.rig_by_plates import lights_near
+from psvideo.report.judge.rig_by_plates import lights_near, rig_misfits
 from psvideo.report.judgement import verdict_of
 from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.close_looks import CloseLooks
@@ -38,6 +38,7 @@ from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.levels import count_levels
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 
 
@@ -60,6 +61,22 @@ def test_among_many_lights_those_that_are_not_as_strong_as_the_rig_says_are_name
     assert re.search(r"it would: 'light5' 8[1-4] %, 'light1' 1(1[7-9]|2[01]) % of what the rig says", line.found)
     assert not any("other strengths" in one.found for one in rig_of(right))
     assert "not as strong" in " ".join(one.found for one in of_accuracy.accuracy(off))
+
+
+@pytest.mark.parametrize("count", [8, 12])
+def test_of_many_lights_those_that_are_off_are_all_named_and_to_be_mended_one_by_one(count: int) -> None:
+    """A bear's strengths were to be measured on the bear: its normals got worse. Most of 18 names were left out."""
+    off = (1, 3, 4, 6, 7)[: count // 2 - 1]
+    found = RigFit(
+        misfit=0.3, own_misfit=0.02, scaled_misfit=0.03,
+        strengths=tuple(1.5 if light in off else 1.0 for light in range(count)),
+    )  # fmt: skip
+    line = rig_misfits([f"light{number}" for number in range(count)], found)
+    assert line is not None
+    named = [number for number in range(count) if f"'light{number}' 150 %" in line.found]
+    assert named == list(off)
+    assert ("multiply their intensities in the rig by these shares" in line.advice) == (count == 12)
+    assert ("psvideo calibrate intensities" in line.advice) == (count == 8)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
