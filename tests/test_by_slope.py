@@ -102,6 +102,31 @@ def test_stripes_round_a_ball_are_paint_though_they_go_as_its_slope_does(*, roun
     assert 0.6 < shown / true < 2
 
 
+def ball_that_fades(shine: float, *, seed: int, noise: float = 0.002) -> Case:
+    """Return a ball whose paint fades softly from one colour to another, in blobs."""
+    _, truth, inside = shapes()[0]
+    rng, ways = np.random.default_rng(seed), ring(3, 35)
+    soft = cv2.GaussianBlur(rng.normal(size=inside.shape), (0, 0), 4)
+    share = np.clip(0.5 + 0.3 * soft / soft[inside].std(), 0, 1)[..., None]
+    albedo, plates = (1 - share) * np.array([0.7, 0.25, 0.2]) + share * np.array([0.85, 0.8, 0.7]), []
+    for way in ways:
+        half = (way + UP) / np.linalg.norm(way + UP)
+        light = albedo * np.maximum(truth @ way, 0)[..., None] + shine * np.maximum(truth @ half, 0)[..., None] ** 10
+        light += rng.normal(0, noise, light.shape)
+        plates.append((light * inside[..., None]).astype(np.float32))
+    return Case("ball", plates, Illumination(directions=ways, intensities=np.ones((3, 3))), truth, inside)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_paint_that_fades_softly_is_no_sheen_where_its_colour_fades_as_well(seed: int) -> None:
+    for noise in (0.002, 0.01):
+        shown, _ = shown_and_true_deg(ball_that_fades(0.0, seed=seed, noise=noise))
+        assert shown < 1.5, "6 and more where only its brightness is looked at"
+    shown, true = shown_and_true_deg(ball_that_fades(0.15, seed=seed))
+    assert true > 2
+    assert 0.8 * true < shown < 2.2 * true
+
+
 def test_a_lens_that_darkens_its_corners_by_a_fifth_turns_nothing() -> None:
     row, col = (np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2) / (SIZE / 2)
     lens = 1 - 0.1 * (row**2 + col**2)

@@ -84,6 +84,25 @@ def paleness(colours: Floats, known: Mask) -> Floats | None:
     return np.asarray(share * known, np.float32)
 
 
+def painted(points: ThinSurface, known: Mask, width: int) -> Floats:
+    """Return how far colour lies beside the subject's own and white, (row, col), means over squares of so many points:
+    nothing that a surface mirrors goes there, only other paint. As far as the subject is coloured, else zeros."""
+    nothing = np.zeros(known.shape, np.float32)
+    if points.surface.albedo.ndim == 2 or not known.any():
+        return nothing
+    squares = blurred(known.astype(np.float32), width)
+    planes = np.moveaxis(points.surface.albedo, -1, 0).astype(np.float32)
+    colours = np.stack([_mean(plane, known, width, squares) for plane in planes])
+    colours /= np.maximum(colours.mean(axis=0), np.float32(1e-6))
+    own = np.array([median(plane[known]) for plane in colours])
+    coloured = float(np.linalg.norm(1 - own))
+    if coloured <= GREY:
+        return nothing
+    beside = np.cross(own, np.ones(3))
+    beside *= _rising(np.float32(coloured), GREY, COLOURED) / np.linalg.norm(beside)
+    return np.asarray(np.tensordot(beside.astype(np.float32), colours, axes=1), np.float32)
+
+
 def spread_across_and_along(points: ThinSurface, lit: Illumination, known: Mask) -> tuple[Floats, Floats]:
     """Return the squares of how far lights spread what each is off by across every normal and along it, (row, col).
 

@@ -7,7 +7,8 @@ generalized bas-relief ambiguity by entropy minimization", CVPR 2007: normals ar
 
 How albedo differs between neighbours is fitted by how smooth functions of their normals do. Where it jumps from one
 point to the next paint ends, and that does not count. Only what the white squares of a chess board over the subject
-tell of the black ones counts: the rest goes with the slope by chance. By how much albedo goes with the slope, and how
+tell of the black ones counts: the rest goes with the slope by chance. Paint that fades as smoothly as a sheen does
+changes colours as no sheen can: what goes with that is taken off. By how much albedo goes with the slope, and how
 the lights spread what is off along the normal and across it, says by how much normals are turned.
 """
 
@@ -20,8 +21,9 @@ from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.added_light import Added, turned_by_added_deg
-from psvideo.solve.normals.trust.by_colour import spread_across_and_along
+from psvideo.solve.normals.trust.by_colour import painted, spread_across_and_along
 from psvideo.solve.normals.trust.slope_pairs import (
+    AVERAGED,
     TYPICAL_OF_MEDIAN,
     SlopePairs,
     averaged,
@@ -65,9 +67,12 @@ def by_slope_deg(
     ``modelled_deg``."""
     normals, albedo, whole = averaged(points, known)
     bright = in_light_of_all(normals, albedo, lit, whole)
-    pairs = pairs_of(normals, without_edges(points.brightness, known), bright) if bright.any() else None
+    if not bright.any():
+        return None
+    pairs = pairs_of(normals, without_edges(points.brightness, known), painted(points, known, AVERAGED), bright)
     if pairs is None:
         return None
+    pairs = _without_paint(pairs, lit)
     shown = np.zeros(known.shape, np.float32)
     if unseen:
         typical_deg = np.float32(unseen * TURNS_MORE * np.degrees(_goes_with_slope(pairs, lit)))
@@ -91,14 +96,31 @@ def _functions(normals: Doubles, directions: NDArray[np.floating]) -> Doubles:
     return np.concatenate([np.stack(smooth, axis=-1), *(shine**power for power in POWERS)], axis=1)
 
 
-def _goes_with_slope(pairs: SlopePairs, lit: Illumination) -> float:
-    """Return by which share of itself albedo typically differs with the slope, as far as one half of the subject tells
-    it of the other."""
+def _changes(pairs: SlopePairs, lit: Illumination) -> tuple[Doubles, Doubles]:
+    """Return by what functions of normals differ (pair, function), 1 in the mean, and what they are at the first of
+    each pair."""
     here, there = (_functions(normals, lit.directions) for normals in (pairs.here, pairs.there))
     changes = there - here
     scale = np.sqrt((changes**2).mean(axis=0)) + 1e-9
-    numbers, told = _fitted(pairs, changes / scale)
-    whole = _about_median(here / scale @ numbers)
+    return changes / scale, here / scale
+
+
+def _without_paint(pairs: SlopePairs, lit: Illumination) -> SlopePairs:
+    """Return the pairs without what of their albedo goes with colours as only paint does, beside functions of normals:
+    fitted by itself, it would take what goes with the slope as well."""
+    if not pairs.paint.any():
+        return pairs
+    paint = pairs.paint / np.sqrt((pairs.paint**2).mean())
+    numbers, _ = robustly(np.concatenate([_changes(pairs, lit)[0], paint[:, None]], axis=1), pairs.differs)
+    return pairs._replace(differs=pairs.differs - numbers[-1] * paint)
+
+
+def _goes_with_slope(pairs: SlopePairs, lit: Illumination) -> float:
+    """Return by which share of itself albedo typically differs with the slope, as far as one half of the subject tells
+    it of the other."""
+    changes, here = _changes(pairs, lit)
+    numbers, told = _fitted(pairs, changes)
+    whole = _about_median(here @ numbers)
     most = MOST_OUTLYING * float(np.sqrt((whole**2).mean()))
     rest, of_place = _without_place(np.clip(whole, -most, most), pairs.place)
     typical, typical_of_place = (TYPICAL_OF_MEDIAN * median(np.abs(each)) for each in (rest, OF_PLACE * of_place))

@@ -35,14 +35,16 @@ TYPICAL_OF_MEDIAN = 1.48
 
 
 class SlopePairs(NamedTuple):
-    """Neighbours: how the logarithm of albedo differs (pair,), the normals of the first and of the other (pair, 3), and
-    where these are, in rows and columns over the subject's size (pair, 2)."""
+    """Neighbours: how the logarithm of albedo differs (pair,), the normals of the first and of the other (pair, 3),
+    where these are, in rows and columns over the subject's size (pair, 2), and how their colours differ as only paint
+    does (pair,)."""
 
     differs: Doubles
     here: Doubles
     there: Doubles
     place: Doubles
     other: Doubles
+    paint: Doubles
 
 
 def averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
@@ -61,9 +63,10 @@ def averaged(points: ThinSurface, known: Mask) -> tuple[Floats, Floats, Mask]:
     return means[:3], means[3], whole
 
 
-def pairs_of(normals: Floats, lengths: Floats, bright: Mask) -> SlopePairs | None:
+def pairs_of(normals: Floats, lengths: Floats, paint: Floats, bright: Mask) -> SlopePairs | None:
     """Return neighbours in the light of all lamps, None where there are too few. ``lengths`` (2, row, col): the
-    logarithm of albedo down the columns and along the rows (``without_edges``)."""
+    logarithm of albedo down the columns and along the rows (``without_edges``); ``paint`` (row, col): how far colour is
+    what only paint makes it (``by_colour.py``)."""
     cols = bright.shape[1]
     over, beside = (np.flatnonzero(both) for both in _both(bright))
     first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
@@ -76,7 +79,9 @@ def pairs_of(normals: Floats, lengths: Floats, bright: Mask) -> SlopePairs | Non
     column, row = lengths.reshape(2, -1)[:, second].astype(np.float64) - lengths.reshape(2, -1)[:, first]
     size = np.sqrt(np.count_nonzero(bright))
     place, other = (np.stack(np.divmod(at, cols), axis=-1) / size for at in (first, second))
-    return SlopePairs(differs=np.where(down, column, row), here=here, there=there, place=place, other=other)
+    painted = paint.reshape(-1).astype(np.float64)
+    painted = painted[second] - painted[first]
+    return SlopePairs(np.where(down, column, row), here=here, there=there, place=place, other=other, paint=painted)
 
 
 def without_edges(albedo: Floats, known: Mask) -> Floats:
