@@ -419,6 +419,23 @@ def test_slow_leds_put_times_in_doubt_where_light_was_read_by_another_curve(
     assert timing.phase_error_s < timing.row_time_s
 
 
+def test_an_exposure_off_by_as_little_as_plans_are_counts_where_clipped_rows_do_not_show_it(
+    make_plan: PlanMaker,
+) -> None:
+    """It moves all flashes by half of itself: in short clips whose rows clip they were 13 us off at a claim of 4."""
+    shot = make_plan(height_px=ROWS, width_px=COLUMNS, lights=tuple("abcde"), shutter=0.9975, readout=0.45)
+    rng = np.random.default_rng(0)
+    bright = {slot: 0.32 + 1.28 * rng.random((ROWS, COLUMNS)) for slot in shot.lit_slots}
+    plates = {slot: image.astype(np.float32) for slot, image in bright.items()}
+    seen = expose(plates, shot, frames=20, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12).frames
+    nominal = with_camera(shot, exposure_s=0.9974 * shot.camera.exposure_s)
+    profiles, clipped = seen.mean(axis=2, dtype=np.float64), np.asarray(seen >= SATURATED).mean(axis=2)
+    timing = timing_from_rows(nominal, np.arange(20), profiles, doubt=clipped)
+    assert timing.phase_error_s is not None
+    assert abs(first_start_s(timing, shot) - 0.0123) < 2 * timing.phase_error_s
+    assert timing.phase_error_s < 0.5 * timing.row_time_s
+
+
 @pytest.mark.parametrize(
     ("coded", "named"), [(lambda part: np.log1p(270 * part) / np.log(271), True), (lambda part: part, False)]
 )

@@ -15,7 +15,14 @@ from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, maybe_otherwise_s, straight, straightened
+from psvideo.sync.rowfit.unknowns.curve import (
+    Curve,
+    Straightened,
+    maybe_otherwise_s,
+    nominally_s,
+    straight,
+    straightened,
+)
 from psvideo.sync.rowfit.unknowns.freed import Freed, freed
 from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
 from psvideo.sync.rowfit.unknowns.misread import OtherCurve, doubt_s, misread
@@ -195,7 +202,11 @@ def _told_from_curve(
 
 
 def _error_s(plan: Plan, best: _Best, as_seen: Fit, stray: Jitter) -> float:
-    """Return the standard error of all flashes' times together."""
+    """Return the standard error of all flashes' times together.
+
+    That exposure or readout may be a little off from what plans say counts where that alone is more than all the rest:
+    added to it, it would double what noise makes of plans that are exact.
+    """
     rows, fit = best.rows, best.fit
     known_s = max(as_seen.shift_error_s, shift_error_s(plan, rows, fit), best.slack_s)
     if stray is not STEADY:
@@ -204,7 +215,8 @@ def _error_s(plan: Plan, best: _Best, as_seen: Fit, stray: Jitter) -> float:
         apart_rows_s = disagreement_s(plan, rows, fit) if rows.restless is None else 0.0
         known_s = max(float(np.hypot(known_s * misfit(plan, rows, fit), apart_rows_s)), fit.alike_s)
         known_s = float(np.hypot(known_s, maybe_astray_s(plan, rows, fit)))
-    return float(np.sqrt(known_s**2 + stray.error_s**2 + best.apart_s**2))
+    nominal_s = nominally_s(plan, rows, fit, tuple(fit.errors_s))
+    return max(float(np.sqrt(known_s**2 + stray.error_s**2 + best.apart_s**2)), nominal_s)
 
 
 def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.arrays import Doubles
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import EDGES, Fit, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
+from psvideo.sync.rowfit.unknowns.misread import CLIPPED
 
 CLEAR = 30.0
 """Variances that a curve, or an exposure, must explain beyond what the other one does, to be needed beside it."""
@@ -32,6 +33,9 @@ PROBE = 1e-3
 """Share of the shortest flash by which times are moved, to see what that changes."""
 FAINT = 1e-4
 """Below this share of saturation a power is not followed: its logarithm has no end."""
+NOMINAL, OFTEN, BENT = 0.003, 0.25, 0.02
+"""Exposures and readouts are off from what plans say by about the first share of themselves, as those are that LED
+stripes show, by odds of the second to one; the third are a curve's odds, unless so much clips that this looks bent."""
 SAME = 1e-10
 """Steps that differ by less than this share of themselves are the same one."""
 
@@ -118,6 +122,29 @@ def maybe_otherwise_s(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     return max(beside_s, rms_apart_s(rows, fit.beat, fitted(plan, rows, fit.beat, (*free, *others)).beat))
 
 
+def nominally_s(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> float:
+    """Return by how much times are in doubt because exposure or readout, where they are not ``free`` in the fit, may be
+    as little off as plans usually are.
+
+    Where rows tell little of them, as where most pixels clip, such an error stays, and moves all flashes. Each is held
+    against the plan's value and against a curve by how likely the rows are under it (Jeffreys 1939).
+    """
+    steps, beat = _steps(plan, rows, fit, free), fit.beat
+    plain = steps.taken([]).gain
+    bent = np.log(BENT) + 0.5 * (steps.best([]).gain - plain) if rows.clipped_share < CLIPPED else -np.inf
+    doubts_s = [0.0]
+    for name, place in (("exposure_s", EXPOSURE), ("row_time_s", ROW_TIME)):
+        off, variance, moved = steps.beside(place)
+        usual = (NOMINAL * getattr(beat, name)) ** 2
+        if name in free or usual == 0.0 or (off > 0.0 and place == EXPOSURE and beat.exposure_s >= rows.period_s):
+            continue
+        kept = usual / (usual + variance)
+        likely = np.log(OFTEN) + 0.5 * (np.log(variance / (usual + variance)) + kept * off**2 / variance)
+        share = float(np.exp(likely - np.logaddexp(likely, np.logaddexp(0.0, bent))))
+        doubts_s.append(float(abs(moved) * np.sqrt(share * ((kept * off) ** 2 + kept * variance))))
+    return max(doubts_s)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Step:
     """What small steps explain, in variances, the steps (step,), and the variance of the common shift."""
@@ -138,12 +165,22 @@ class _Steps:
     def taken(self, more: Sequence[int]) -> _Step:
         """Return the best steps of the times that are free anyway, and of ``more``."""
         kept = np.array([*self.always, *more])
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.matrix)[kept], 1e-300))
-        scale = np.outer(unit, unit)
-        inverse = np.linalg.pinv(self.matrix[np.ix_(kept, kept)] * scale, rcond=SAME, hermitian=True) * scale
+        inverse = self._inverse(kept)
         by = np.zeros(len(self.pull))
         by[kept] = inverse @ self.pull[kept]
         return _Step(gain=float(by @ self.pull), by=by, variance=float(inverse[0, 0]))
+
+    def beside(self, place: int) -> tuple[float, float, float]:
+        """Return the step of one more time, its variance, and by how much all flashes move with it."""
+        kept, own = np.array(self.always), float(self.matrix[place, place])
+        along = self._inverse(kept) @ self.matrix[kept, place]
+        stiff = max(float(own - self.matrix[place, kept] @ along), SAME * own, 1e-300)
+        return float(self.pull[place] - self.pull[kept] @ along) / stiff, 1.0 / stiff, -float(along[SHIFT])
+
+    def _inverse(self, kept: Integers) -> Doubles:
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.matrix)[kept], 1e-300))
+        scale = np.outer(unit, unit)
+        return np.asarray(np.linalg.pinv(self.matrix[np.ix_(kept, kept)] * scale, rcond=SAME, hermitian=True) * scale)
 
     def best(self, more: Sequence[int]) -> _Step:
         """Return the best steps with a curve as well, of the fewest shapes that explain as much."""
