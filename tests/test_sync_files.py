@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from bench.compression import TRIALS, Trial, trial_of, tried
 from bench.timing_files import write_h264
 
+from psvideo.errors import NoStrobeError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
@@ -124,3 +126,26 @@ def test_mosaics_are_timed_as_they_are(make_plan: PlanMaker, tmp_path: Path) -> 
         path = tmp_path / f"frame.{number:04d}.dng"
         write_frame(path, codes.from_light(picture), kind="dng", camera=camera, scale=codes)
     assert rms_rows(timing_through(tmp_path, plan), shot, plan) < 0.02
+
+
+@pytest.mark.parametrize(("turns", "back"), [(1, "clockwise"), (-1, "counterclockwise")])
+def test_footage_that_was_turned_by_90_degrees_is_said_to_be(
+    turns: int, back: str, make_plan: PlanMaker, tmp_path: Path
+) -> None:
+    """Its rows all see the whole readout, as under another camera: all flashes were 0.95 ms off at a claim of 0.09."""
+    lights = tuple("abcdef")
+    plan = make_plan(height_px=96, width_px=80, lights=lights, duration_s=0.001, readout=0.3, clock_tolerance_ppm=100)
+    rng = np.random.default_rng(8)
+    row, col = np.mgrid[0:96, 0:80]
+    plates: dict[int, np.ndarray] = {}
+    for slot in plan.lit_slots:
+        far = (row - rng.uniform(20, 76)) ** 2 + (col - rng.uniform(20, 60)) ** 2
+        plates[slot] = (0.05 + 0.6 * np.exp(-far / rng.uniform(200, 900))).astype(np.float32)
+    clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-90, 90))
+    shot = expose(plates, plan, frames=70, clock=clock, noise=Noise(full_well_e=20_000, read_e=8), bits=12, seed=8)
+    for n, frame in enumerate(np.rot90(shot.frames, turns, axes=(1, 2))):
+        codes = np.rint(np.clip(frame, 0, 1) * 65535).astype(np.uint16)
+        assert cv2.imwrite(str(tmp_path / f"{n:04d}.png"), codes)
+    turned = replace(plan, camera=replace(plan.camera, width_px=96, height_px=80, encoding=Encoding(transfer="linear")))
+    with pytest.raises(NoStrobeError, match=f"along the columns of the pictures.*turn them back, {back} "):
+        timing_through(tmp_path, turned)

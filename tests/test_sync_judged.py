@@ -419,6 +419,24 @@ def test_slow_leds_put_times_in_doubt_where_light_was_read_by_another_curve(
     assert timing.phase_error_s < timing.row_time_s
 
 
+def test_another_camera_that_leaves_times_unsure_is_none(make_plan: PlanMaker) -> None:
+    """Footage that was turned by 90 degrees looks like a global shutter's: flashes of 1.9 ms were 1.2 ms off."""
+    made = make_plan(
+        height_px=96, width_px=80, duration_s=0.0019, shutter=0.75, readout=0.99, clock_tolerance_ppm=10_000
+    )
+    rng = np.random.default_rng(10)
+    row, col = np.mgrid[0:96, 0:80]
+    plates: dict[int, np.ndarray] = {}
+    for slot in made.lit_slots:
+        far = (row - rng.uniform(20, 76)) ** 2 + (col - rng.uniform(20, 60)) ** 2
+        plates[slot] = (0.05 + 0.6 * np.exp(-far / rng.uniform(200, 900))).astype(np.float32)
+    clock = TrueClock(phase_s=rng.uniform(0, made.cycle_s), offset_ppm=rng.uniform(-90, 90))
+    shot = expose(plates, made, frames=83, clock=clock, noise=NOISE, bits=12, seed=10)
+    turned = replace(made, camera=replace(made.camera, height_px=80, width_px=96))
+    with pytest.raises(NoStrobeError, match="no strobe like the plan's"):
+        timing_from_rows(turned, np.arange(83), shot.frames.mean(axis=1, dtype=np.float64))
+
+
 def test_an_exposure_off_by_as_little_as_plans_are_counts_where_clipped_rows_do_not_show_it(
     make_plan: PlanMaker,
 ) -> None:

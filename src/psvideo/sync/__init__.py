@@ -8,5 +8,5 @@ were lost, and ``beside_breaks`` those in frames that nothing is sure of; ``mark
 ``named_strobe`` is a fit whose flashes have names, ``frames_taken`` gives the timing of the frames that it was found
 in. Where the strobe began again, ``restarted`` finds each part of the clip by itself, ``unbroken`` says whether they
 are one strobe after all, ``clip_parts`` decides, ``joined`` makes one timing. ``shared_flashes`` compares the clocks of
-several cameras, whose plans ``same_strobe`` compares first.
+several cameras, whose plans ``same_strobe`` compares first. ``sideways`` knows footage that was turned by 90 degrees.
 """

@@ -111,7 +111,7 @@ def _to_fit(
     *,
     clip: str,
 ) -> Profiles:
-    rows = _as_profiles(plan, indices, profiles, doubt)
+    rows = as_profiles(plan, indices, profiles, doubt)
     hopeless = nothing_to_find(plan, rows)
     if hopeless:
         raise NoStrobeError(f"{clip}: {hopeless}")
@@ -145,7 +145,7 @@ def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
     return f"{clip}: no strobe like the plan's was found in the picture: the best fit {explained}. {reason or ADVICE}"
 
 
-def _as_profiles(
+def as_profiles(
     plan: Plan, indices: NDArray[np.int64], values: Doubles, doubt: NDArray[np.floating] | None
 ) -> Profiles:
     """Lay out the profiles for fitting, rows in the order in which they open as far as that is known."""

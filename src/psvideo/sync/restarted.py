@@ -68,11 +68,12 @@ def _found(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[tuple[slic
         parts = _judged(plan, rows, again)
     sure = _trusted(plan, rows, [_shorn(plan, rows, part) for part in parts])
     if sum(cut.stop - cut.start for cut, _ in sure) < MOST_TIMED * len(rows.value):
-        sure = [one for one in sure if _beyond_doubt(plan, one[1])]
+        sure = [one for one in sure if beyond_doubt(plan, one[1])]
     return sure
 
 
-def _beyond_doubt(plan: Plan, found: ClipFit) -> bool:
+def beyond_doubt(plan: Plan, found: ClipFit) -> bool:
+    """Return whether the strobe takes nearly all of the robust loss away and leaves nothing to doubt in the plan."""
     return gain_of(found.rows, found.fit.rest) > BEYOND_DOUBT and not doubtful(plan, found)
 
 

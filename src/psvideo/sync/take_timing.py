@@ -15,6 +15,7 @@ from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.model.units import counted
 from psvideo.sync.find import timing_from_rows
+from psvideo.sync.sideways import another_camera, refuse_sideways
 
 MOST_NAMED = 8
 """Holes that a sentence names."""
@@ -46,9 +47,9 @@ def take_profiles(take: Take, *, watch: Watch = unwatched) -> TakeProfiles:
 
 
 def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str | None = None) -> Timing:
-    """Return when every flash fired. Raises PsvideoError where no strobe is found."""
+    """Return when every flash fired. Raises PsvideoError where no strobe is found, or one along the columns only."""
     try:
-        return timing_from_rows(
+        timing = timing_from_rows(
             take.plan,
             profiles.index,
             profiles.value,
@@ -61,7 +62,11 @@ def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str |
     except NoStrobeError:
         if take.clip.is_movie and take.clip.dropped and _found_without_gaps(take, profiles):
             raise _stamps_are_false(take) from None
+        refuse_sideways(take)
         raise
+    if another_camera(take.plan, timing):
+        refuse_sideways(take)
+    return timing
 
 
 def _found_without_gaps(take: Take, profiles: TakeProfiles) -> bool:
