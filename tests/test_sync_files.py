@@ -149,3 +149,15 @@ def test_footage_that_was_turned_by_90_degrees_is_said_to_be(
     turned = replace(plan, camera=replace(plan.camera, width_px=96, height_px=80, encoding=Encoding(transfer="linear")))
     with pytest.raises(NoStrobeError, match=f"along the columns of the pictures.*turn them back, {back} "):
         timing_through(tmp_path, turned)
+
+
+@pytest.mark.parametrize(("frames", "said"), [(2, "holds 2 frames"), (20, "do not change at all")])
+def test_columns_are_not_asked_where_there_is_nothing_to_find(
+    frames: int, said: str, make_plan: PlanMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("psvideo.sync.sideways.best_rival", None)
+    plan = make_plan(height_px=24, width_px=24)
+    for n in range(frames):
+        assert cv2.imwrite(str(tmp_path / f"{n:04d}.png"), np.full((24, 24), 9000, np.uint16))
+    with pytest.raises(NoStrobeError, match=said):
+        timing_through(tmp_path, plan)

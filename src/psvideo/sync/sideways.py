@@ -19,6 +19,7 @@ from psvideo.sync.find import as_profiles
 from psvideo.sync.restarted import beyond_doubt
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.verdict.believed import MOVED, convincing
+from psvideo.sync.verdict.refusal import nothing_to_find
 from psvideo.sync.verdict.rivals import Rival, best_rival
 
 MOST_FRAMES = 240
@@ -50,6 +51,8 @@ def refuse_sideways(take: Take) -> None:
     upright = replace(camera, width_px=camera.height_px, height_px=camera.width_px)
     plans = [replace(take.plan, camera=replace(upright, readout_s=sign * camera.readout_s)) for sign in (1, -1)]
     rows = as_profiles(plans[0], index, value, doubt)
+    if nothing_to_find(plans[0], rows):
+        return
     best = best_rival(plans[0], rows, [Rival(plan=one, fault="readout") for one in plans], leaves=np.inf)
     if best is None:
         return
