@@ -18,7 +18,7 @@ from psvideo.model.arrays import Codes8, Doubles, Floats
 from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.shake.by_paint import places_by_paint
 from psvideo.plates.align.shake.one_surface import OneSurface
-from psvideo.plates.align.shake.registered import registered, shifted
+from psvideo.plates.align.shake.registered import registered, roughly, shifted
 from psvideo.plates.align.shake.shifting_picture import explained_by, stirs
 from psvideo.plates.align.velocity.between_lights import MIDDLE, edges_of
 from psvideo.plates.align.velocity.brightness import light_of
@@ -71,15 +71,18 @@ def camera_path(pairs: Sequence[Pair], lamps: Lamps | None = None) -> CameraPath
     if min(pairs[0].before.codes.shape) < SMALLEST_PX * scale:
         return None
     details = over_ranges(lambda n, _: tuple(_detail(one, scale) for one in _shown(pairs[n])), len(pairs), each=1)
+    both = [each for each in details if len(each) > 1]
+    near = over_ranges(lambda n, _: roughly(*both[n]), len(both), each=1)
+    if scale * _apart_px(np.array(near)) < SHAKES_PX / 2:
+        return None
     own = over_ranges(lambda n, _: registered(details[n][0], details[n][-1]), len(details), each=1)
     shifts = np.array([one.px for one in own])
-    ways = shifts[[len(both) > 1 for both in details]]
-    shakes = scale * np.sqrt(np.square(ways - ways.mean(axis=0)).sum(axis=1).mean()) >= SHAKES_PX
-    if not shakes or not explained_by([both for both in details if len(both) > 1], ways):
+    ways = shifts[[len(each) > 1 for each in details]]
+    if scale * _apart_px(ways) < SHAKES_PX or not explained_by(both, ways):
         return None
     times = np.array([sketch.time_s for pair in pairs for sketch in _shown(pair)])
-    firsts = np.cumsum([0, *(len(both) for both in details[:-1])])
-    places, painted = places_by_paint(times, [one for both in details for one in both], firsts, shifts)
+    firsts = np.cumsum([0, *(len(each) for each in details[:-1])])
+    places, painted = places_by_paint(times, [one for each in details for one in each], firsts, shifts)
     found = places if painted else None
     if lamps is not None and (sure := _by_surface(lamps, pairs, shifts, places[firsts], scale)) is not None:
         found = sure
@@ -102,6 +105,11 @@ def _by_surface(
         return None
     ends = zip(firsts, firsts + shifts, pairs, strict=True)
     return np.array([place for one, other, pair in ends for place in (one, other)[: len(_shown(pair))]])
+
+
+def _apart_px(ways: Doubles) -> float:
+    """Return how far shifts (light, 2) are from their mean, a root of the mean of squares."""
+    return float(np.sqrt(np.square(ways - ways.mean(axis=0)).sum(axis=1).mean()))
 
 
 def _shown(pair: Pair) -> tuple[Sketch, ...]:

@@ -39,15 +39,26 @@ def shifted(picture: Floats, px: Doubles, fill: int = cv2.BORDER_REPLICATE) -> F
 
 
 def registered(one: Floats, other: Floats) -> Shift:
-    """Return the shift between two pictures of detail, around 0, (row, col), the likelier of two: what is found from
-    none, and from where phases correlate."""
-    window = cv2.createHanningWindow(one.shape[::-1], cv2.CV_32F)
-    start, _ = cv2.phaseCorrelate(one * window, other * window)  # given the window, it would put it on the pictures
+    """Return the shift between two pictures of detail, around 0, (row, col)."""
+    return _refined(one, other, roughly(one, other))
+
+
+def roughly(one: Floats, other: Floats) -> Doubles:
+    """Return about the same, (2,), from pictures of half the size: the likelier of what is found there from none, and
+    from where phases correlate."""
+    small = [_halved(each) for each in (one, other)]
+    window = cv2.createHanningWindow(small[0].shape[::-1], cv2.CV_32F)
+    start, _ = cv2.phaseCorrelate(*(each * window for each in small))  # given the window, it would put it on them
     starts = [np.zeros(2)]
-    if 0.5 < np.abs(start).max() < FARTHEST * min(one.shape):
+    if 0.5 < np.abs(start).max() < FARTHEST * min(small[0].shape):
         starts.append(np.array(start, np.float64))
-    found = [_refined(one, other, start) for start in starts]
-    return min(found, key=lambda shift: shift.unlike)
+    found = [_refined(small[0], small[1], start) for start in starts]
+    return 2 * min(found, key=lambda shift: shift.unlike).px
+
+
+def _halved(picture: Floats) -> Floats:
+    rows, cols = (size // 2 for size in picture.shape)
+    return np.asarray(cv2.resize(picture, (cols, rows), interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _refined(one: Floats, other: Floats, start_px: Doubles) -> Shift:
