@@ -19,6 +19,7 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import POOLED_ROUNDS, Round
 from psvideo.solve.at_rest import LOOKS_EVERY
 from psvideo.solve.instants import surfaces
+from psvideo.solve.normals import plate_noise, solving
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.trust import judging, signs
 from psvideo.solve.normals.trust.doubts import POOLED_LOOKS, Doubt, Doubts
@@ -98,6 +99,26 @@ def test_rounds_under_masks_of_their_own_look_each(make_plan: MakePlan, looks: l
 def test_a_round_that_moved_leaves_nothing_to_the_next(make_plan: MakePlan, looks: list[int]) -> None:
     solved([a_round(1001, unsure=UNSURE), a_round(1002), a_round(1003)], make_plan)
     assert len(looks) == 2
+
+
+def test_a_round_of_which_rows_are_missing_leaves_nothing_to_the_next(make_plan: MakePlan, looks: list[int]) -> None:
+    whole = a_round(1001)
+    seen = np.arange(ROWS) > 5
+    cut = replace(whole, plates=(replace(whole.plates[0], seen=seen), *whole.plates[1:]))
+    solved([cut, a_round(1002), a_round(1003)], make_plan)
+    assert len(looks) == 2
+
+
+def test_how_noisy_plates_are_is_known_from_the_last_look(make_plan: MakePlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, noise_of = list[int](), plate_noise.noise_of
+
+    def counting(*given: Any) -> PlateNoise:
+        asked.append(len(asked))
+        return noise_of(*given)
+
+    monkeypatch.setattr(solving, "noise_of", counting)
+    solved([a_round(number) for number in range(1001, 1001 + POOLED_ROUNDS)], make_plan)
+    assert len(asked) == 1 + POOLED_ROUNDS // LOOKS_EVERY
 
 
 def test_rounds_that_say_nothing_of_each_other_look_each(make_plan: MakePlan, looks: list[int]) -> None:

@@ -58,7 +58,7 @@ def judged(
     spread = NoiseSpread.of(some, one, noise, how.spreading, near)
     points = spread.points(some)
     doubts, moving = before, None
-    if before.look_again or not before.looks:
+    if before.look_again:
         found, moving = _found(points, one, noise, how)
         doubts = before.and_of(found, noise)
     shown = doubts.mean
