@@ -19,6 +19,9 @@ MARGIN_PX = 8
 """What lies so near to the border may come from beyond it."""
 FARTHEST = 0.1
 """Nothing is shifted by more than this share of the picture's shorter side between two flashes."""
+HALVED_PX = 128
+"""Pictures from this size on, across their shorter side, are compared at half of it first; less would show too little.
+"""
 HALF, LEAST = np.float32(0.5), 1e-6
 
 
@@ -44,16 +47,17 @@ def registered(one: Floats, other: Floats) -> Shift:
 
 
 def roughly(one: Floats, other: Floats) -> Doubles:
-    """Return about the same, (2,), from pictures of half the size: the likelier of what is found there from none, and
-    from where phases correlate."""
-    small = [_halved(each) for each in (one, other)]
+    """Return about the same, (2,), from pictures of half the size where they are large: the likelier of what is found
+    there from none, and from where phases correlate."""
+    scale = 2 if min(one.shape) >= HALVED_PX else 1
+    small = [_halved(each) for each in (one, other)] if scale > 1 else [one, other]
     window = cv2.createHanningWindow(small[0].shape[::-1], cv2.CV_32F)
     start, _ = cv2.phaseCorrelate(*(each * window for each in small))  # given the window, it would put it on them
     starts = [np.zeros(2)]
     if 0.5 < np.abs(start).max() < FARTHEST * min(small[0].shape):
         starts.append(np.array(start, np.float64))
     found = [_refined(small[0], small[1], start) for start in starts]
-    return 2 * min(found, key=lambda shift: shift.unlike).px
+    return scale * min(found, key=lambda shift: shift.unlike).px
 
 
 def _halved(picture: Floats) -> Floats:
