@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.model.rig import Light
+from psvideo.model.surface import Surface
 from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.shake.camera_path import CameraPath, camera_path
@@ -19,11 +20,14 @@ from psvideo.plates.align.velocity.vectors import fill_per_s
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
+from psvideo.report.observe.observed import Observed
 
 ROWS, COLS, ROUND_S = 128, 176, 1.0
 AROUND_PX = 40
 """So much more of the scene lies around the picture, for it to shift."""
 NOISE = 0.003
+PER_S = 13.2 * math.cos(4.9), -12.2 * math.sin(6.1)
+"""How fast the picture that trembles goes in the middle of round 1."""
 Way = Callable[[float], tuple[float, float]]
 
 
@@ -160,22 +164,54 @@ def test_two_pictures_are_registered_and_left_as_they_are() -> None:
     np.testing.assert_array_equal(other, before[1])
 
 
-def brought(count: int, align: str, *, known: bool = True) -> Round:
+def brought(count: int, align: str, *, known: bool = True, way: Way = trembles) -> Round:
     how = Aligning(align="auto" if align == "auto" else "none", lights=lights_of(count) if known else ())
     names = tuple(light.name for light in lights_of(count))
-    return next(one for one in aligned(plates_of(count, trembles), names, how, first=0) if one.number == 1)
+    return next(one for one in aligned(plates_of(count, way), names, how, first=0) if one.number == 1)
+
+
+def off_by(one: Round, count: int, way: Way) -> float:
+    """By how much plates are off those of the round's middle, well within the picture: root of the mean of squares."""
+    inner, true = np.s_[8:-8, 8:-8], [seen_at(light, way(ROUND_S), True) for light in lights_of(count)]
+    both = [np.square(plate.image - image)[inner] for plate, image in zip(one.plates, true, strict=True)]
+    return float(np.sqrt(np.mean(both)))
 
 
 @pytest.mark.parametrize(("count", "known"), [(4, True), (6, True), (3, False)])
 def test_plates_of_a_camera_that_shakes_show_the_picture_of_one_instant(count: int, known: bool) -> None:
-    one, inner = brought(count, "auto", known=known), np.s_[8:-8, 8:-8]
-    off = {}
-    for align, shown in (("auto", one), ("none", brought(count, "none"))):
-        true = [seen_at(light, trembles(ROUND_S), True) for light in lights_of(count)]
-        both = [np.square(plate.image - image)[inner] for plate, image in zip(shown.plates, true, strict=True)]
-        off[align] = float(np.sqrt(np.mean(both)))
-    assert off["auto"] < off["none"] / 3
-    assert all(plate.pixels_seen[inner].all() for plate in one.plates)
+    one = brought(count, "auto", known=known)
+    assert off_by(one, count, trembles) < off_by(brought(count, "none"), count, trembles) / 3
+    assert all(plate.pixels_seen[8:-8, 8:-8].all() for plate in one.plates)
+
+
+@pytest.mark.parametrize("light", [0, 4], ids=["early", "late"])
+def test_a_light_whose_two_plates_lie_on_each_other_by_chance_is_moved_all_the_same(light: int) -> None:
+    """As where a hand turns back: it lies elsewhere than the instant, and the others still say where that is."""
+    first_s = flash_s(light, 5) + (ROUND_S if light == 0 else 0)
+
+    def comes_back(time_s: float) -> tuple[float, float]:
+        return trembles(first_s if abs(time_s - first_s - ROUND_S) < 1e-6 else time_s)
+
+    one = brought(5, "auto", way=comes_back)
+    assert one.motion is not None
+    assert one.motion.carried != (0, 0)
+    assert off_by(one, 5, comes_back) < off_by(brought(5, "none", way=comes_back), 5, comes_back) / 3
+    assert one.unsure is not None
+    assert np.median(one.unsure[light]) < 0.02
+
+
+def test_all_of_a_picture_that_shakes_moves_and_nothing_of_it_is_held_to_be_at_rest() -> None:
+    """Fine detail that shifts everywhere would pass for noise between plates of one light."""
+    shakes, count = brought(5, "auto"), 5
+    observed = Observed(lights=tuple(light.name for light in lights_of(count)))
+    normals = np.zeros((ROWS, COLS, 3), np.float32) + np.array([0, 0, 1], np.float32)
+    surface = Surface(normals=normals, albedo=np.ones((ROWS, COLS), np.float32), valid=np.ones((ROWS, COLS), np.bool_))
+    for _ in range(2):
+        observed.add(shakes, surface)
+    for facts in observed.facts:
+        assert facts.moving_share == 1
+        assert facts.change is None
+        assert facts.speed_px_s == pytest.approx(math.hypot(*PER_S), abs=1)
 
 
 def test_what_left_the_picture_of_both_plates_is_not_known() -> None:

@@ -168,6 +168,28 @@ class Held:
             raise ValueError(f"light {light} of instant {instant.number} is still to come")
         return around
 
+    def pair_around(self, light: str, instant: DueInstant) -> tuple[Shot, Shot] | None:
+        """Return a light's shots before and after an instant, or twice the one that shows it, whether or not anything
+        moved between them; None where there is none."""
+        own = self.shots[light][instant.round]
+        if own.time_s == instant.time_s:
+            return own, own
+        other = self.shots[light].get(instant.round + (-1 if own.time_s > instant.time_s else 1))
+        if other is None:
+            return None
+        return (other, own) if other.time_s < own.time_s else (own, other)
+
+    def own_shot(self, light: str, instant: DueInstant) -> Shot:
+        """Return a light's shot in an instant's round, with the plate that was handed on from there to be shown."""
+        shot, made = self.shots[light][instant.round], instant.made.get(light)
+        return shot if made is None else replace(shot, plate=replace(made, number=shot.round, time_s=shot.time_s))
+
+    def take_back(self, light: str, instant: DueInstant) -> None:
+        """Hold a light's plate again that was handed on as it is: its picture is to be moved after all."""
+        self.shots[light][instant.round] = self.own_shot(light, instant)
+        del instant.made[light]
+        instant.moving.add(light)
+
     def plates_of(self, instant: DueInstant) -> list[LightPlate]:
         """Return the plates of lights under which something moves that an instant is made from, of those held."""
         around = [self.sure_around(light, instant) for light in instant.moving]

@@ -192,13 +192,18 @@ def _pair(around: Around) -> Pair:
     return Pair(before=before, after=evened(before, after))
 
 
+def _pairs_of(held: Held, instant: DueInstant) -> dict[str, Pair]:
+    """Return the sketches around an instant of all lights under which something moves."""
+    return {light: _pair(held.sure_around(light, instant)) for light in held.lights if light in instant.moving}
+
+
 def _make_moving(held: Held, instant: DueInstant) -> None:
     """Make the plates of all lights under which something moves; each is let go as soon as it was used."""
-    lights = [light for light in held.lights if light in instant.moving]
-    pairs = [_pair(held.sure_around(light, instant)) for light in lights]
-    steady = steady_at(held, instant, pairs)
+    by_light = _pairs_of(held, instant)
+    steady = steady_at(held, instant, by_light)
     if steady is not None:
-        pairs = [steady.pair(pair) for pair in pairs]
+        by_light = {light: steady.pair(pair) for light, pair in _pairs_of(held, instant).items()}
+    lights, pairs = [*by_light], [*by_light.values()]
     instant.motion = motion = followed_at(pairs, instant.time_s, others=len(held.lights) - len(lights))
     if steady is not None:
         instant.motion = motion = replace(motion, carried=steady.per_s(motion.step))

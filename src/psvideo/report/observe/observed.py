@@ -32,7 +32,7 @@ from psvideo.report.observe.rig_and_curve.rigpoints import PointLight, RigPoints
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
-from psvideo.report.observe.watched_motion import WatchedMotion
+from psvideo.report.observe.watched_motion import WatchedMotion, shaken
 from psvideo.report.observe.worst import Thumbnail, Worst
 
 UNEVEN = 0.5
@@ -141,7 +141,10 @@ class Observed:
         self.motion.watch_brightest(self.lights)
         yield
         some = None if surface is None else thin_surface(surface)
-        moving, changed, stirs = self.motion.latest, self._change(surface, some), self.motion.stirring(one.time_s)
+        moving, stirs = shaken(self.motion.latest, one), self.motion.stirring(one.time_s)
+        shakes = moving is not None and moving is not self.motion.latest
+        changed = self._change(surface, some, shakes=shakes)
+        stirs = moving.changed if moving is not None and shakes else stirs
         facts = instant_facts(
             one, surface, mask, changed, seen=seen, some=some, moving=moving, stirs=stirs, dark=self._dark
         )
@@ -231,6 +234,7 @@ class Observed:
         found = astray(one.plates, points, (down, across))
         self.closely.astray += [] if found is None else [found]
 
-    def _change(self, surface: Surface | None, some: Surface | None) -> Change | None:
-        before, self._sample = self._sample, None if surface is None else sample_of(surface, some)
+    def _change(self, surface: Surface | None, some: Surface | None, *, shakes: bool) -> Change | None:
+        """Hold a surface against the one before; nothing is at rest in one that the camera ``shakes``."""
+        before, self._sample = self._sample, None if surface is None or shakes else sample_of(surface, some)
         return None if before is None or self._sample is None else change(before, self._sample)

@@ -1,10 +1,13 @@
-"""What moves between the plates of one light, looked for as they pass."""
+"""What moves between the plates of one light, looked for as they pass; and where a camera shakes, the whole picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from psvideo.model.arrays import Flags
 from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.sequence import Round
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 
 WEAK_BESIDE = 1 / 8
@@ -64,3 +67,15 @@ class WatchedMotion:
         if before is None or time_s > (self._before_s + self._glimpse.time_s) / 2:
             return changed
         return None if before.changed is None else changed & before.changed
+
+
+def shaken(moving: Motion | None, one: Round) -> Motion | None:
+    """Return what moves in a round whose plates were brought to one instant: all of the picture where the camera shook,
+    else what was seen to. Fine detail that shifts everywhere looks like noise in the plates of one light."""
+    if one.motion is None or one.motion.carried == (0.0, 0.0):
+        return moving
+    pixels = np.array(one.plates[0].shape[1::-1]) / one.motion.moves.shape[::-1]
+    speed_px_s = float(np.hypot(*(pixels * one.motion.carried)))
+    if moving is not None and moving.speed_px_s is not None:
+        speed_px_s = max(speed_px_s, moving.speed_px_s)
+    return Motion(speed_px_s=speed_px_s, share=1.0, changed=np.ones((1, 1), np.bool_))

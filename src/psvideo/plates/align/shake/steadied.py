@@ -1,6 +1,6 @@
 """Sketches shifted to where the picture is at an instant, and what plates are taken from that lie elsewhere."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import cv2
@@ -11,6 +11,7 @@ from psvideo.model.arrays import Codes8
 from psvideo.plates.align.light_history import DueInstant, Held
 from psvideo.plates.align.pixel_sources import outside
 from psvideo.plates.align.shake.camera_path import CameraPath, camera_path
+from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
@@ -75,18 +76,35 @@ class Steadied:
         return replace(sketch, codes=np.asarray(codes, np.uint8), seen=np.asarray(shown > 127), filled=filled)
 
 
-def steady_at(held: Held, instant: DueInstant, pairs: Sequence[Pair]) -> Steadied | None:
-    """Return where the picture is at an instant as a whole, None where the camera does not shake, where a light stood
-    still all the same, or where a part of the plates comes from other rounds, and so from elsewhere. ``pairs`` are
-    those of lights under which something moves, in their order."""
-    given, every = iter(pairs), list[Pair]()
-    for light in held.lights:
-        own = held.shots[light][instant.round]
-        if light in instant.moving:
-            every.append(next(given))
-        elif own.sketch is not None and own.time_s == instant.time_s:
-            every.append(Pair(before=own.sketch, after=own.sketch))
-    if len(every) < len(held.lights) or any(not plate.own.all() for plate in held.plates_of(instant)):
+def steady_at(held: Held, instant: DueInstant, pairs: Mapping[str, Pair]) -> Steadied | None:
+    """Return where the picture is at an instant as a whole, None where the camera does not shake, or where a part of
+    the plates comes from other rounds, and so from elsewhere. ``pairs`` are those of lights under which something
+    moves.
+
+    Under other lights both plates lie on each other by chance, as where a hand turns back, but not where the picture is
+    at the instant: those that were handed on as they are, are taken back.
+    """
+    every = [pairs.get(light) or _pair_that_stood(held, light, instant) for light in held.lights]
+    known = [pair for pair in every if pair is not None]
+    stood = [light for light in held.lights if light not in pairs and not _shows(held, light, instant)]
+    plates = [*held.plates_of(instant), *(held.own_shot(light, instant).plate for light in stood)]
+    if len(known) < len(every) or not all(plate is not None and plate.own.all() for plate in plates):
         return None
-    path = camera_path(every, held.lamps)
-    return None if path is None else Steadied(path=path, instant_s=instant.time_s, shape=pairs[0].before.codes.shape)
+    path = camera_path(known, held.lamps)
+    if path is None:
+        return None
+    for light in stood:
+        held.take_back(light, instant)
+    return Steadied(path=path, instant_s=instant.time_s, shape=known[0].before.codes.shape)
+
+
+def _shows(held: Held, light: str, instant: DueInstant) -> bool:
+    return held.shots[light][instant.round].time_s == instant.time_s
+
+
+def _pair_that_stood(held: Held, light: str, instant: DueInstant) -> Pair | None:
+    shots = held.pair_around(light, instant)
+    if shots is None or shots[0].sketch is None or shots[1].sketch is None:
+        return None
+    before, after = shots[0].sketch, shots[1].sketch
+    return Pair(before=before, after=before if after is before else evened(before, after))
