@@ -140,10 +140,13 @@ def test_normals_that_belong_to_no_surface_are_in_doubt_where_something_stirs() 
     doubt = moving_doubt_deg(turned, torn, known)
     assert doubt[42:50, 42:50].min() > 5
     assert not doubt[:10].any(), "a third of the subject away"
+    alone = moving_doubt_deg(turned, np.zeros(shape, np.float32), known)
+    np.testing.assert_array_equal(moving_doubt_deg(turned, torn, known, steadied=True), alone)
     turned[:] = 0
     moves = np.zeros(shape, np.bool_)
     moves[50:60, 50:60] = True
-    assert moving_doubt_deg(turned, torn, known, moves)[42:50, 42:50].min() > 5
+    for steadied in (False, True):
+        assert moving_doubt_deg(turned, torn, known, moves, steadied=steadied)[42:50, 42:50].min() > 5
 
 
 def test_creases_and_outlines_of_what_is_followed_rightly_are_hardly_in_doubt() -> None:

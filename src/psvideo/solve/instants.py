@@ -200,20 +200,22 @@ class _RoundSolver:
         as the surface is found."""
         plates, seen, mask, light = given.plates, given.shown, given.mask, self._light(one)
         unsure = _unsure(one, self.shares)
-        moves = None if one.motion is None else one.motion.moves
+        moves, steadied = (None, False) if one.motion is None else (one.motion.moves, one.motion.steadied)
         here = None if self.near is None else swept(self.near.at(one.number), self._scaled(one), plates, seen=seen)
         lit = light(ground=None if here is None else here.ground)
 
         def solve(found: Illumination) -> Surface:
             nonlocal lit
             lit = found
-            return self.solving.solve(plates, found, seen=seen, mask=mask, unsure=unsure, moves=moves)
+            return self.solving.solve(
+                plates, found, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied
+            )
 
         if here is not None:
             return solve_near(here, lambda ground: light(ground=ground), solve), lit
         before = Doubts() if self.at_rest is None else self.at_rest.until(one)
         surface, doubts = self.solving.solve_again(
-            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, before=before
+            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied, before=before
         )
         alone = self.one_by_one or (self.masks is not None and self.masks.still is None)
         self.at_rest = None if alone else AtRest.since(one, doubts)

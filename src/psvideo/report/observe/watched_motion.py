@@ -72,7 +72,7 @@ class WatchedMotion:
 def shaken(moving: Motion | None, one: Round) -> Motion | None:
     """Return what moves in a round whose plates were brought to one instant: all of the picture where the camera shook,
     else what was seen to. Fine detail that shifts everywhere looks like noise in the plates of one light."""
-    if one.motion is None or one.motion.carried == (0.0, 0.0):
+    if one.motion is None or one.motion.carried is None:
         return moving
     pixels = np.array(one.plates[0].shape[1::-1]) / one.motion.moves.shape[::-1]
     speed_px_s = float(np.hypot(*(pixels * one.motion.carried)))

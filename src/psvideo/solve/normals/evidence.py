@@ -39,8 +39,9 @@ class Evidence:
     """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on.
 
     ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
-    ``moves`` (row, col), on that grid, where something was followed. ``indirect`` is what the solver saw on its way,
-    and ``left``, where plates are unsure. ``grid_px`` is how many points there are at most along the longer side.
+    ``moves`` (row, col), on that grid, where something was followed; ``steadied``: beside that plates were brought
+    together by one shift of the whole picture. ``indirect`` is what the solver saw on its way, and ``left``, where
+    plates are unsure. ``grid_px`` is how many points there are at most along the longer side.
     """
 
     plates: Sequence[Samples] | Sequence[Mixture]
@@ -50,6 +51,7 @@ class Evidence:
     mask: Mask | None = None
     unsure: Floats | None = None
     moves: Mask | None = None
+    steadied: bool = False
     indirect: Indirect | None = None
     left: Left | None = None
     black_level: float = 0.0

@@ -74,10 +74,11 @@ class Solving:
         mask: Mask | None = None,
         unsure: Floats | None = None,
         moves: Mask | None = None,
+        steadied: bool = False,
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments, and ``Evidence`` for
-        what is unsure of the plates and ``moves``."""
-        return self.solve_again(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves)[0]
+        what is unsure of the plates, ``moves`` and is ``steadied``."""
+        return self.solve_again(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied)[0]
 
     def solve_again(
         self,
@@ -88,6 +89,7 @@ class Solving:
         mask: Mask | None = None,
         unsure: Floats | None = None,
         moves: Mask | None = None,
+        steadied: bool = False,
         before: Doubts = Doubts(),
     ) -> tuple[Surface, Doubts]:
         """Return the same, and how far it may be off beyond noise, with what was known of that ``before``, of rounds in
@@ -96,7 +98,7 @@ class Solving:
         from psvideo.solve.filling.leaving_out import left_out
 
         solved, one, noise = self.measured(
-            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, noise=before.known_noise
+            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied, noise=before.known_noise
         )
         known, doubts = judged(solved, one, noise, before=before)
         without = left_out(known, one, solved=solved.valid) if self.fill else None
@@ -139,6 +141,7 @@ class Solving:
         mask: Mask | None = None,
         unsure: Floats | None = None,
         moves: Mask | None = None,
+        steadied: bool = False,
         noise: PlateNoise | None = None,
     ) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by; ``noise`` is that of
@@ -153,6 +156,7 @@ class Solving:
             mask=mask,
             unsure=unsure,
             moves=moves,
+            steadied=steadied,
             spare=self.spare,
             grid_px=self.grid_px,
         )

@@ -27,8 +27,9 @@ from psvideo.plates.align.velocity.followed import Pair
 
 FEWEST, SMALLEST_PX = 3, 64
 """So many lights, and pictures so wide and high."""
-SHAKES_PX = 0.3
-"""What goes on by less more or less from light to light has one velocity, and is followed by it."""
+SHAKES_PX = 0.1
+"""What goes on by less more or less from light to light, in the pictures that are compared, has one velocity, and is
+followed by it."""
 FITS, SURELY = 0.7, 0.05
 """One surface must leave less than the first along the path, as a share of what it leaves of the pictures as they are,
 and less than the second of all: photographs of what is not matte leave 0.12 to 0.6, at places 1 to 5 px beside."""
@@ -73,12 +74,12 @@ def camera_path(pairs: Sequence[Pair], lamps: Lamps | None = None) -> CameraPath
     details = over_ranges(lambda n, _: tuple(_detail(one, scale) for one in _shown(pairs[n])), len(pairs), each=1)
     both = [each for each in details if len(each) > 1]
     near = over_ranges(lambda n, _: roughly(*both[n]), len(both), each=1)
-    if scale * _apart_px(np.array(near)) < SHAKES_PX / 2:
+    if _apart_px(np.array(near)) < SHAKES_PX / 2:
         return None
     own = over_ranges(lambda n, _: registered(details[n][0], details[n][-1]), len(details), each=1)
     shifts = np.array([one.px for one in own])
     ways = shifts[[len(each) > 1 for each in details]]
-    if scale * _apart_px(ways) < SHAKES_PX or not explained_by(both, ways):
+    if _apart_px(ways) < SHAKES_PX or not explained_by(both, ways):
         return None
     times = np.array([sketch.time_s for pair in pairs for sketch in _shown(pair)])
     firsts = np.cumsum([0, *(len(each) for each in details[:-1])])

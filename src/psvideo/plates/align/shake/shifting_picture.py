@@ -17,9 +17,9 @@ STIRS, MOST_STEP = 0.25, np.float32(40)
 second."""
 WINDOW_PX, ODD = 9, np.float32(20.0)
 """Pictures are compared over the first; what differs by the second, in codes of detail, is half unlike."""
-UNLIKE, EXPLAINED, FOLLOWS, BETTER = 0.1, 0.65, 0.6, 0.75
+UNLIKE, EXPLAINED, FOLLOWS = 0.1, 0.65, 0.6
 """Of what is more unlike at rest than the first, per light, the shifts must leave less than the second in more than
-this share, and all in all less than the fourth of what one velocity leaves; noise is taken off."""
+this share; noise is taken off."""
 QUIET = 0.25
 """Noise leaves as much as this share of the picture is unlike by, at most."""
 
@@ -36,17 +36,14 @@ def stirs(pairs: Sequence[Pair]) -> bool:
 
 
 def explained_by(details: Sequence[tuple[Floats, ...]], shifts: Doubles) -> bool:
-    """Return whether shifts (light, 2) explain most of what changes between two pictures of each light, and clearly
-    more than their mean does."""
-    ways = np.zeros_like(shifts), np.broadcast_to(shifts.mean(axis=0), shifts.shape), shifts
-    rest, steady, own = (_unlike(details, way) for way in ways)
+    """Return whether shifts (light, 2) explain most of what changes between two pictures of each light."""
+    rest, own = (_unlike(details, way) for way in (np.zeros_like(shifts), shifts))
     noise = np.float32(quantile(own, QUIET))
-    rest, steady, own = rest - noise, steady - noise, own - noise
+    rest, own = rest - noise, own - noise
     puzzling = rest > np.float32(UNLIKE * len(details))
     if not puzzling.any():
         return False
-    follows = float(np.mean(own[puzzling] < np.float32(EXPLAINED) * rest[puzzling]))
-    return follows > FOLLOWS and float(own[puzzling].sum()) < BETTER * float(steady[puzzling].sum())
+    return float(np.mean(own[puzzling] < np.float32(EXPLAINED) * rest[puzzling])) > FOLLOWS
 
 
 def _unlike(details: Sequence[tuple[Floats, ...]], shifts: Doubles) -> Floats:

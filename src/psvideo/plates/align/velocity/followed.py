@@ -25,7 +25,7 @@ class Followed:
     (row, col) is what clearly stands beside that; the rest looks alike either way. ``unchanged`` (row, col) is
     under how many of all lights a pixel that does not move shows the same before and after. Each of these pixels is
     ``step`` by ``step`` of the sketches'. ``carried`` is how fast a camera that shakes shifts all of the picture, x and
-    y in its own pixels per second; the velocity is what comes on top."""
+    y in its own pixels per second, None where it does not; the velocity is what comes on top."""
 
     time_s: float
     velocity: Floats
@@ -33,7 +33,7 @@ class Followed:
     rests: Flags
     unchanged: NDArray[np.int16] = field(default_factory=lambda: np.zeros((1, 1), np.int16))
     step: int = 1
-    carried: tuple[float, float] = (0.0, 0.0)
+    carried: tuple[float, float] | None = None
 
     @functools.cached_property
     def nearby(self) -> Floats:
@@ -45,6 +45,11 @@ class Followed:
         of_label = np.zeros((2, int(labels.max()) + 1), np.float32)
         of_label[:, labels[self.moves]] = self.velocity[:, self.moves]
         return of_label[:, labels]
+
+    @property
+    def steadied(self) -> bool:
+        """Whether plates were brought together by one shift of the whole picture, beside what moves in it."""
+        return self.carried is not None
 
     def without(self, still: Flags) -> "Followed":
         """Return the same with nothing that moves where ``still`` (row, col)."""

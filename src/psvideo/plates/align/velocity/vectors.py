@@ -30,7 +30,8 @@ def fill_per_s(motion: Followed | None, planes: Floats) -> None:
         return
     small_rows, small_cols = motion.moves.shape
     scale = cols / small_cols, rows / small_rows
-    for factor, way, carried, plane in zip(scale, _of_whole_things(motion), motion.carried, planes, strict=True):
+    along = motion.carried or (0.0, 0.0)
+    for factor, way, carried, plane in zip(scale, _of_whole_things(motion), along, planes, strict=True):
         cv2.resize(way + np.float32(carried), (cols, rows), dst=plane, interpolation=cv2.INTER_LINEAR)
         plane *= np.float32(factor)
         let_go(plane)

@@ -83,7 +83,9 @@ def _found(points: ThinSurface, one: Evidence, noise: PlateNoise, how: Judging) 
     if turned_deg is None:
         return Doubt.of(signs, how.doubting), None
     known, check = points.known.astype(np.float32), checked(points, one, noise)
-    moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, check=check, how=how.moving)
+    moving = moving_doubt_deg(
+        turned_deg, signs.torn_deg, known, one.moves, steadied=one.steadied, check=check, how=how.moving
+    )
     return Doubt.of(signs, how.doubting), moving
 
 

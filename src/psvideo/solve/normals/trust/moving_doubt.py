@@ -151,6 +151,7 @@ def moving_doubt_deg(
     known: Floats,
     moves: Mask | None = None,
     *,
+    steadied: bool = False,
     check: Checked | None = None,
     how: MovingDoubt = MovingDoubt(),
 ) -> Floats:
@@ -158,7 +159,8 @@ def moving_doubt_deg(
 
     ``torn_deg`` is by how much normals belong to no surface: where motion was followed to the wrong place, plates of
     the lights show edges beside each other, and normals between them fit nothing around. What moves and what stands
-    still, on a grid of its own, ``moves``, do not speak for each other. ``check`` is what more than three lights say.
+    still, on a grid of its own, ``moves``, do not speak for each other. Of plates that were ``steadied`` nothing else
+    was followed, and what is torn is an edge as at rest. ``check`` is what more than three lights say.
     """
     size, own = (width_of(known, how.around),) * 2, np.zeros(known.shape, np.bool_)
     if moves is not None:
@@ -167,17 +169,25 @@ def moving_doubt_deg(
     tells = known * (turned_deg <= MOST_DEG)  # beyond that nothing is known, and nothing is said of what is around
     turned = own_mean(np.minimum(turned_deg, np.float32(60)) * tells, size, own)
     around = turned / np.maximum(own_mean(tells, size, own), np.float32(1e-6))
-    apart = _torn_doubt(turned_deg, torn_deg, tells, own, check, how)
+    stirs = own if steadied else (turned_deg > how.stirring_deg) | own
+    apart = _torn_doubt(turned_deg, torn_deg, tells, (own, stirs), check, how)
     enough_deg = how.around_deg * (1 if check is None else 1 + min(check.beyond, MOST_CHECKS))
     doubt = np.float32(how.own) * turned_deg + around * around / np.float32(enough_deg) + apart
     return np.asarray(np.minimum(doubt, np.float32(how.most_deg)), np.float32)
 
 
 def _torn_doubt(
-    turned_deg: Floats, torn_deg: Floats, known: Floats, moves: Mask, check: Checked | None, how: MovingDoubt
+    turned_deg: Floats,
+    torn_deg: Floats,
+    known: Floats,
+    where: tuple[Mask, Mask],
+    check: Checked | None,
+    how: MovingDoubt,
 ) -> Floats:
+    """``where`` is what moves, and what stirs."""
+    moves, stirring = where
     near, size = ((width_of(known, share),) * 2 for share in (how.near, how.torn_around))
-    stirs = cv2.blur(((turned_deg > how.stirring_deg) | moves).astype(np.float32), near)
+    stirs = cv2.blur(stirring.astype(np.float32), near)
     around = cv2.blur(torn_deg * known, size) / np.maximum(cv2.blur(known, size), np.float32(1e-6))
     own = np.maximum(torn_deg - np.float32(how.least_torn_deg), 0)
     around = np.maximum(around - np.float32(how.least_around_deg), 0)
