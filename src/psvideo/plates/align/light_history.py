@@ -169,14 +169,12 @@ class Held:
         return around
 
     def pair_around(self, light: str, instant: DueInstant) -> tuple[Shot, Shot] | None:
-        """Return a light's shots before and after an instant, or twice the one that shows it, whether or not anything
-        moved between them; None where there is none."""
-        own = self.shots[light][instant.round]
-        if own.time_s == instant.time_s:
-            return own, own
-        other = self.shots[light].get(instant.round + (-1 if own.time_s > instant.time_s else 1))
+        """Return a light's shots before and after an instant, one of which may show it, whether or not anything moved
+        between them, or twice that one where there is no other; None where there is none."""
+        shots, own = self.shots[light], self.shots[light][instant.round]
+        other = shots.get(instant.round + (-1 if own.time_s >= instant.time_s else 1))
         if other is None:
-            return None
+            return (own, own) if own.time_s == instant.time_s else None
         return (other, own) if other.time_s < own.time_s else (own, other)
 
     def own_shot(self, light: str, instant: DueInstant) -> Shot:
