@@ -47,7 +47,8 @@ def unfired_of(
     A flash of which too little was seen, as below 360 degrees most that fall between two exposures, is one where those
     of its light before and after are, and may be one where one of them is, or the next one of any light on either side
     of which enough was seen. ``breaks``: whether the strobe began at the first frame, or stopped at the last, or some
-    frames off: flashes beyond all that are seen to give light may not have fired.
+    frames off: flashes beyond all that are seen to give light may not have fired, and a dark slot there may be
+    none, but the dark of a strobe that stood still.
 
     One light's flashes, with those of others between them, under ``breaks`` (True, False). What they give is 1, 0 or
     not known; ``told`` are those of which it is::
@@ -76,8 +77,11 @@ def unfired_of(
                 (never if all(dead) else beside).add(lit[n].index)
     beside |= {lit[n].index for n in _beside_off(off, told)} - never
     shows = np.flatnonzero(gives)
-    early, late = (lit[: shows[0]], lit[shows[-1] + 1 :]) if len(shows) else ([], [])
-    beside.update(flash.index for there, some in zip(breaks, (early, late), strict=True) if there for flash in some)
+    if len(shows):
+        first, last = lit[shows[0]].index, lit[shows[-1]].index
+        beside |= {
+            one.index for one in flashes if (breaks[0] and one.index < first) or (breaks[1] and one.index > last)
+        }
     return Unfired(never=frozenset(never - beside), beside=frozenset(beside))
 
 
