@@ -15,11 +15,11 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.coarse import seed as seed_module
-from psvideo.sync.rowfit.coarse.retime import regular_step, twins
+from psvideo.sync.rowfit.coarse.retime import Numbering, regular_step, twins
 from psvideo.sync.rowfit.coarse.seed import find_seed, other_seeds
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.tracking.course import memory_frames
+from psvideo.sync.rowfit.tracking.course import followed, memory_frames
 from psvideo.sync.rowfit.tracking.track import track
 from psvideo.sync.verdict.believed import convincing
 from psvideo.sync.verdict.refusal import clock_too_far
@@ -312,6 +312,18 @@ def test_numberings_are_looked_for_where_nearly_all_frames_of_a_stretch_are_alik
     seeds = list(other_seeds(plan, rows, find_seed(plan, rows)))
     assert seeds
     assert all(len(seed.numbering.index) > 100 for seed in seeds)
+
+
+@pytest.mark.parametrize("guessed", [16, 19, 20])
+def test_a_single_hole_that_was_guessed_as_a_rule_lies_where_frames_show_it(plan: Plan, guessed: int) -> None:
+    """One frame of twenty left out explains a short clip in which one is missing, a frame or more from where it is."""
+    true, numbered = np.delete(np.arange(37), 19), np.arange(36)
+    whole = profiles_of(plan, shot_of(plan, 37))
+    rows = replace(whole, value=np.ascontiguousarray(whole.value[true]), index=true)
+    rule = Numbering(kept=np.ones(36, np.bool_), index=numbered + (numbered > guessed), plain=numbered)
+    seed = replace(find_seed(plan, rows), numbering=rule, frames=slice(20, 36))
+    course = followed(plan, replace(rows, index=numbered), seed)
+    assert course.track.index.tolist() == true.tolist()
 
 
 @pytest.mark.parametrize("missing", [3, 7])

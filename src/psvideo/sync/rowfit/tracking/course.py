@@ -7,6 +7,7 @@ import numpy as np
 from psvideo.model.arrays import Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.sync.rowfit.coarse.retime import regular_step
 from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.tracking.ends import ends
@@ -68,7 +69,8 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows))
     tracked = without_false_holes(plan, kept, tracked, seed.frames)
     tracked = replace(tracked, beat=replace(tracked.beat, clock=clock_through(plan, tracked)))
-    index, unsure = settled(plan, kept, tracked.index, tracked.beat)
+    numbered = kept.index if regular_step(kept.index, numbering.plain) != 1 else numbering.plain
+    index, unsure = settled(plan, replace(kept, index=numbered), tracked.index, tracked.beat)
     placed = ends(plan, kept, index, tracked.beat)
     tracked = from_first_frame(kept, replace(tracked, index=placed.index))
     index = tracked.index
