@@ -21,6 +21,7 @@ from psvideo.report.observe.observed import Observed
 from psvideo.solve.depth import View
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.huber1981 import solve
 from psvideo.solve.normals.robust.weighing import Reweighting
@@ -236,6 +237,33 @@ def test_normals_that_sheen_turns_are_mostly_called_invalid() -> None:
     assert far[valid].mean() < 0.03
     assert far[invalid].mean() > 10 * far[valid].mean()
     assert valid[:, :60].sum() > 0.97 * inside[:, :60].sum()
+
+
+def test_what_was_not_followed_does_not_spoil_what_stands_around_it() -> None:
+    """Two thirds of the plates lie beside each other, and say that they may: the rest is judged as if alone."""
+    normals, _ = ball(reach_deg=60)
+    lit = lit_by(ring(5, 40))
+    rng = np.random.default_rng(9)
+    plates = [plate + rng.normal(0, 0.002, plate.shape).astype(np.float32) for plate in shoot(normals, lit)]
+    cols = plates[0].shape[1]
+    moves = slice(0, 2 * cols // 3)
+    passed = [plate.copy() for plate in plates]
+    for n, plate in enumerate(passed):
+        plate[:, moves] = np.roll(plate[:, moves], 5 * n, axis=1)
+    unsure = np.zeros((5, *plates[0].shape), np.float32)
+    unsure[:, :, moves] = 0.3
+    rest = np.s_[:, 2 * cols // 3 + cols // 8 :]
+    noise = PlateNoise(read=4e-6, photon=0.0)
+    alone, beside, blamed = (
+        solve(images, lit, plate_noise=noise, unsure=given)
+        for images, given in ((plates, None), (passed, unsure), (passed, None))
+    )
+    typical = list[float]()
+    for one in (alone, beside, blamed):
+        assert one.error_deg is not None
+        typical.append(float(np.median(one.error_deg[rest][one.albedo[rest] > 0.3])))
+    assert typical[1] < 1.2 * typical[0]
+    assert typical[2] > 2 * typical[0], "or this would show nothing"
 
 
 def test_where_nothing_can_contradict_no_misfit_is_claimed() -> None:

@@ -1,7 +1,8 @@
 """The robust solver: least squares in which shadows and highlights weigh little. ``huber1981`` is the method,
 ``weighing`` holds its settings, and ``solution`` what it solves and where that goes.
 
-``first_look`` finds what is typical of a picture, from a sample of its rows. Then a block of pixels goes through
+``first_look`` finds what is typical of a picture, from a sample of its rows, where what moves leaves it
+``sure_of_motion``. Then a block of pixels goes through
 ``robust_kernel``:
 
 1. ``explained``: plain least squares; pixels that it explains to their noise are done

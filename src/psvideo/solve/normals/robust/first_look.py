@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.compute.ranks import median
+from psvideo.model.arrays import Floats
 from psvideo.model.surface import Misfit, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.light_sigmas import light_sigmas, root_sigmas
 from psvideo.solve.normals.robust.solution import Solution
+from psvideo.solve.normals.robust.sure_of_motion import sure_of_motion
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting, weights
 from psvideo.solve.normals.task import LIGHTS
 
@@ -19,20 +21,25 @@ OTHERWISE = 0.1
 
 
 def first_look(
-    solution: Solution, lit: Illumination, reweighting: Reweighting, noise: tuple[float, float]
+    solution: Solution,
+    lit: Illumination,
+    reweighting: Reweighting,
+    noise: tuple[float, float],
+    unsure: Floats | None = None,
 ) -> tuple[Surface, Misfit | None, int]:
     """Solve a sample of the rows: return their surface, what is typical of the picture, and how many rows apart they
-    are. ``noise`` is that of a measurement, as ``combined_noise`` gives it, zeros where it is not known.
+    are. ``noise`` is that of a measurement, as ``combined_noise`` gives it, zeros where it is not known. Where plates
+    are ``unsure`` for motion, nothing is typical: a box that tumbles before a wall would spoil the wall.
 
     Lights are weighed by the root of their strength first. Where that is not what their noise says, the sample is
     solved again: residuals of lights whose noise is alike show what else there is.
     """
-    looked = _Look.of(solution, reweighting, noise)
+    looked = _Look.of(solution, lit, reweighting, noise, unsure)
     if looked.misfit is None or not noise[0] > 0:
         return looked.found, looked.misfit, looked.step
     sigmas = light_sigmas(lit, noise, light=looked.light)
     if np.abs(np.log(sigmas / root_sigmas(lit))).max() > OTHERWISE:
-        looked = _Look.of(solution.balanced(sigmas), reweighting, noise)
+        looked = _Look.of(solution.balanced(sigmas), lit, reweighting, noise, unsure)
     sigmas = light_sigmas(lit, noise, light=looked.light, share=looked.share_beyond(noise))
     misfit = None if looked.misfit is None else replace(looked.misfit, sigmas=tuple(sigmas.tolist()))
     return looked.found, misfit, looked.step
@@ -51,7 +58,14 @@ class _Look:
     least: float = 0.0
 
     @classmethod
-    def of(cls, solution: Solution, reweighting: Reweighting, noise: tuple[float, float]) -> "_Look":
+    def of(
+        cls,
+        solution: Solution,
+        lit: Illumination,
+        reweighting: Reweighting,
+        noise: tuple[float, float],
+        unsure: Floats | None,
+    ) -> "_Look":
         """What is typical is that of their brighter half, where noise counts less."""
         rows, cols = solution.shown.shape[:2]
         step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros((rows, cols), np.float32)
@@ -61,6 +75,9 @@ class _Look:
         known = sampled > 0
         if found.error_deg is None or not known.any():
             return cls(found=found, step=step)
+        if unsure is not None:
+            sure = known & sure_of_motion(unsure, found, np.arange(0, rows, step), lit)
+            known = sure if sure.any() else known
         channels = found.albedo[::step][known].astype(np.float32).reshape(int(known.sum()), -1)
         light = np.linalg.norm(channels, axis=1)
         bright = light >= median(light)

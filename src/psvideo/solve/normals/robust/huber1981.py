@@ -75,7 +75,7 @@ def solve(
         half=half, residual=residual, spare=spare, threads=threads,
     )  # fmt: skip
     if misfit is None:
-        found, misfit, step = first_look(solution, lit, reweighting, noise)
+        found, misfit, step = first_look(solution, lit, reweighting, noise, unsure)
         if misfit is not None and subject is None:
             points = points_of(
                 plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale, unsure=unsure
@@ -117,7 +117,7 @@ def look(
     """
     noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
     solution = Solution.of(plates, lit, seen, mask, usable, 0.0, 1.0, noise, half=False, residual=False, spare=spare)
-    found, misfit, step = first_look(solution, lit, reweighting, noise)
+    found, misfit, step = first_look(solution, lit, reweighting, noise, unsure)
     if misfit is None:
         return None
     return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0, unsure=unsure)

@@ -2,29 +2,22 @@
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles, Floats, Mask
-from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, fitted, joined
+from psvideo.solve.normals.robust.sure_of_motion import sure_of_motion
 from psvideo.solve.normals.task import Samples, Usable
 
 LIGHTS_FOR_REFLECTANCE = 5
 ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800
 """The model is fitted to this many points of this many rows, to fewer under many lights."""
-MOST_UNSURE = 0.05
-"""What a light's plate may be off by for motion, as a share of what shines straight on the surface, where a point still
-speaks for the subject: what was not followed leaves residuals that pass for sheen and roughness."""
-AROUND_SHARE = 1 / 16
-"""Nor may plates be off by more on average over this share of the picture's longer side: where most of what is around
-was not followed, what fits does so by chance."""
 
 
 def reflectance_of(looks: Sequence[SubjectPoints]) -> Reflectance | None:
@@ -44,7 +37,7 @@ def points_of(
     solved = np.arange(0, found.valid.shape[0], step)
     solved = solved[found.valid[solved].any(axis=1)]
     rows = solved[np.unique(np.linspace(0, len(solved) - 1, ROWS).astype(np.intp))] if len(solved) else solved
-    known = found.valid[rows] if unsure is None else found.valid[rows] & _sure(unsure, found, rows, lit)
+    known = found.valid[rows] if unsure is None else found.valid[rows] & sure_of_motion(unsure, found, rows, lit)
     where, cols = np.nonzero(known)
     if len(where) < LEAST_POINTS:
         return None
@@ -67,21 +60,6 @@ def points_at(
     to_camera = lit.view.towards_camera(at, *plates[0].shape[:2])
     unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return _points((samples - black_level) * scale, lit, at, here, usable, unit, to_camera)
-
-
-def _sure(unsure: Floats, found: Surface, rows: NDArray[np.intp], lit: Illumination) -> Mask:
-    """Return of some rows where no light's plate may be off by more than MOST_UNSURE, there and around."""
-    high, wide = unsure.shape[1:]
-    window = (max(round(max(high, wide) * AROUND_SHARE) | 1, 3),) * 2
-    most = np.zeros((high, wide), np.float32)
-    for plane, lamp in zip(unsure, lit.intensities.mean(axis=1), strict=True):
-        share = np.minimum(plane / np.float32(lamp), np.float32(1))
-        np.maximum(most, np.maximum(share, cv2.blur(share, window)), out=most)
-    albedo = found.albedo[rows].astype(np.float32)
-    albedo = albedo if albedo.ndim == 2 else mean_of_channels(albedo)
-    cols = np.arange(albedo.shape[1])
-    here = most[(rows * high // len(found.valid))[:, None], cols * wide // len(cols)]
-    return np.asarray(here <= np.float32(MOST_UNSURE) * albedo)
 
 
 def _seen(seen: Mask, at: tuple[NDArray[np.intp], NDArray[np.intp]]) -> Mask:
