@@ -12,6 +12,7 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
 from psvideo.inspect.describe import describe
+from psvideo.runs.instants.shot_and_settings import sentences
 
 
 def test_pictures_of_no_size_are_refused(tmp_path: Path) -> None:
@@ -143,6 +144,14 @@ def test_the_command_says_what_it_assumed(tmp_path: Path, capsys: pytest.Capture
     assert "The only result</summary>" in page
     assert ".;" not in page[page.index("Remarks") :], "sentences are joined once"
     assert not any(words in page for words in ("a second", "shutter", "Lasts", "<h2>Timing</h2>", "Strobe"))
+
+
+def test_remarks_are_joined_as_sentences() -> None:
+    assert sentences([]) == ""
+    assert sentences(["One stands alone"]) == "One stands alone."
+    assert sentences(["Each ends once.", "A capital begins one", "x.png follows."]) == (
+        "Each ends once. A capital begins one; x.png follows."
+    )
 
 
 def test_info_says_what_a_folder_of_photographs_is_read_as_and_what_differs(tmp_path: Path) -> None:

@@ -149,6 +149,16 @@ def test_where_noise_alone_spoils_normals_motion_is_not_blamed(noise_deg: float,
     assert blamed in lacking.advice
 
 
+@pytest.mark.parametrize(("share", "said"), [(0.004, "0 % of the subject"), (0.006, "1 % of the subject")])
+def test_where_nothing_is_trusted_there_is_no_elsewhere(share: float, said: str) -> None:
+    one = Footage().observed(0)
+    one.facts = KeptFacts(replace(facts, valid_share=share, measured_share=0.98) for facts in one.facts)
+    (lacking,) = of_validity.validity(one)
+    assert said in lacking.found
+    assert ("everywhere" in lacking.found) == (share < 0.005)
+    assert ("elsewhere" in lacking.found) == (share > 0.005)
+
+
 @pytest.mark.parametrize("fill", [True, False])
 def test_validity_is_counted_over_the_subject_filled_or_not_before_a_dim_backdrop(fill: bool) -> None:
     one = Footage(dark=0.45, solved=True, fill=fill)

@@ -16,7 +16,7 @@ TAIL = 1024
 NO_LENGTH = {0x01, *range(0xD0, 0xD9)}
 FRAME_MARKERS = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 BLOCK = 8
-LOSSY = "JPEG frames have 8 bits and are lossy, which costs accuracy; record PNG, TIFF, DPX, EXR or DNG"
+LOSSY = "JPEG pictures have 8 bits and are lossy, which costs accuracy; record PNG, TIFF, DPX, EXR or DNG"
 
 
 def header(path: Path) -> Header:

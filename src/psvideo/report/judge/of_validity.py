@@ -26,6 +26,8 @@ LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 NONE_VALID = 0.05
 """With less, what is good for a look is all that is left: no take to be used where no line says how far normals are
 off. (A cat under twelve directions that are a few degrees off: as little, and accuracy says by how much.)"""
+NONE_SAID = 0.005
+"""With less, the share is said as 0 %, and there is nothing elsewhere."""
 CLIPPING_FIRST = (
     "See the line on clipping first: what clips is no measurement, and more light clips more. Beyond that, place the "
     "lights nearer to the camera's axis, or use more of them, so that three reach every part."
@@ -70,11 +72,14 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
     said = enough and _said_by_accuracy(observed, most)
     grade: Grade = "bad" if most < HARDLY_VALID and not said else "doubtful"
     if enough:
+        rest = "its predicted error is too large everywhere"
+        if usual >= NONE_SAID:
+            rest = "elsewhere its predicted error is too large"
         yield Judgement(
             subject="validity",
             grade=grade,
-            found=f"Three lights reach {100 * reach:.0f} % of the subject, and {found}: elsewhere its predicted error "
-            "is too large." + (" These normals serve a look, and no measurement." if usual < NONE_VALID else ""),
+            found=f"Three lights reach {100 * reach:.0f} % of the subject, and {found}: "
+            f"{rest}." + (" These normals serve a look, and no measurement." if usual < NONE_VALID else ""),
             advice=first or _trusting(observed),
         )
         return

@@ -48,8 +48,15 @@ def shot_words(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         + (f"{clip.header.bits} bits" if clip.header.bits else "floating point")
         + (f", mosaic {clip.cfa}" if clip.cfa else ""),
         **(_taken_one_by_one(clip, flashes) if clip.stills else _filmed(clip, numbers, flashes)),
-        "Remarks": "; ".join(one.rstrip(".") for one in remarks if one) or "none",
+        "Remarks": sentences([one for one in remarks if one]) or "none",
     }
+
+
+def sentences(remarks: Sequence[str]) -> str:
+    """Return remarks as sentences: each ends once, and one that begins small follows the one before it."""
+    ended = [one.rstrip(". ") for one in remarks]
+    marks = ["; " if other[0].islower() else ". " for other in ended[1:]]
+    return "".join(one + mark for one, mark in zip(ended, [*marks, "."], strict=False))
 
 
 def _taken_one_by_one(clip: Clip, lights: str) -> dict[str, str]:
