@@ -97,6 +97,19 @@ def test_elsewhere_progress_is_a_plain_line_now_and_then(
     assert re.fullmatch(r"filming: \d+ of 20 frames, [\d.]+ frames/s, \d+ s left", lines[0])
 
 
+def test_what_the_first_item_waits_for_is_not_expected_of_the_others(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Loops are compiled while the first item is worked on, which may take a minute."""
+    clock = iter([0.0, 50.0, 51.0, 52.0, 60.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    list(Voice().track(range(4), total=10, what="filming"))
+    assert capsys.readouterr().err.splitlines() == [
+        "filming: 1 of 10 frames",
+        "filming: 4 of 10 frames, 0.3 frames/s, 20 s left",
+    ]
+
+
 def test_quiet_says_nothing_and_machines_get_no_text_on_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     quiet, machines = Voice(quiet=True), Voice(json=True)
     quiet.say("a")

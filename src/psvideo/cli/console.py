@@ -171,12 +171,23 @@ def _bar(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[It
 
 
 def _lines(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:
-    began = said = time.monotonic()
+    """Say how far a step is now and then. Its first item may wait for loops to be compiled, and tells no rate."""
+    first = said = time.monotonic()
     for count, item in enumerate(items, start=1):
         yield item
         now = time.monotonic()
+        first = now if count == 1 else first
         if now - said >= PLAIN_PROGRESS_EVERY_S and count < total:
-            rate = count / (now - began)
-            left_s = (total - count) / rate
-            print(f"{what}: {count} of {total} {unit}, {rate:.1f} {unit}/s, {left_s:.0f} s left", file=sys.stderr)
+            print(
+                f"{what}: {count} of {total} {unit}{_pace(count - 1, now - first, total - count, unit)}",
+                file=sys.stderr,
+            )
             said = now
+
+
+def _pace(done: int, seconds: float, left: int, unit: str) -> str:
+    """Return the rate of what was done and the time for what is left; nothing where nothing tells."""
+    if done < 1 or seconds <= 0:
+        return ""
+    rate = done / seconds
+    return f", {rate:.1f} {unit}/s, {left / rate:.0f} s left"
