@@ -23,6 +23,7 @@ from psvideo.plates.align.as_they_are import (
     stands_under,
 )
 from psvideo.plates.align.between import Ends, plate_at
+from psvideo.plates.align.by_surface import BySurface
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.doubt.unsure import UNKNOWN
@@ -33,6 +34,7 @@ from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
 from psvideo.plates.align.shake.steadied import Steadied, steady_at
 from psvideo.plates.align.velocity.brightness import evened
+from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
 from psvideo.plates.align.velocity.moving_kernel import NOWHERE
@@ -204,7 +206,10 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     if steady is not None:
         by_light = {light: steady.pair(pair) for light, pair in _pairs_of(held, instant).items()}
     lights, pairs = [*by_light], [*by_light.values()]
-    instant.motion = motion = followed_at(pairs, instant.time_s, others=len(held.lights) - len(lights))
+    by_surface = BySurface.of(held.lamps, by_light, _standing(held, instant))
+    choose = None if by_surface is None else by_surface.chosen
+    motion = followed_at(pairs, instant.time_s, others=len(held.lights) - len(lights), choose=choose)
+    instant.motion = motion
     if steady is not None:
         instant.motion = motion = replace(motion, carried=steady.per_s(motion.step))
     shown = over_ranges(lambda n, _: taken_of(pairs[n], motion, guessed=instant.guessed), len(pairs), each=1)
@@ -232,6 +237,12 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
         _hand_on(instant, plate)
         instant.moving.remove(light)
         held.let_go()
+
+
+def _standing(held: Held, instant: DueInstant) -> dict[str, Sketch | None]:
+    """Return the sketches of an instant of all lights under which nothing moves."""
+    still = [light for light in held.lights if light not in instant.moving]
+    return {light: held.shots[light][instant.round].sketch for light in still}
 
 
 def _better_without(held: Held, instant: DueInstant, taken: dict[str, Taken]) -> Callable[[Flags], Flags] | None:

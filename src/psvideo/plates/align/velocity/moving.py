@@ -6,7 +6,7 @@ standing still is always proposed. Taken is what makes the plates of all lights 
 nothing explains much more than rest does: flow that fits shadows and shading of one light says nothing of the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -49,15 +49,20 @@ pairs to 0.045, the difference of two such means to 0.065, so that chance makes 
 LEAST = np.float32(1e-6)
 
 
-def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0) -> Followed:
+Choosing = Callable[[AllLights, Sequence[Floats], Followed, Flags], Followed]
+"""What chooses again, by all lights, between velocities that flow proposes and what was found; what is still stays."""
+
+
+def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose: Choosing | None = None) -> Followed:
     """Return how everything moves at an instant, which may lie before or after some lights' plates too. ``others`` is
-    the number of lights under which nothing moves."""
+    the number of lights under which nothing moves; ``choose`` has the last word."""
     lights = AllLights.of(pairs, time_s)
     between = BetweenLights.of(lights.codes, lights.spans_s, lights.shape)
     none = np.zeros((2, *lights.shape), np.float32)
     rest = lights.unlike(none)
     wide_rest, fine_rest = lights.mean(rest, WINDOW_PX), lights.mean(rest, FINE_PX)
-    chosen = _best(lights, between, wide_rest)
+    proposals = lights.proposed()
+    chosen = _best(lights, between, proposals, wide_rest)
     velocity, best, fine = chosen.velocity, chosen.wide, lights.mean(chosen.unlike, FINE_PX)
     unchanged = np.asarray(lights.unchanged() + others, np.int16)
     stirs = ~lights.at_rest(unchanged, others)
@@ -69,7 +74,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0) -> Fol
         moves, rests = _grown(lights, moves, velocity, (wide_rest, fine_rest), stirs)
     moves &= ~_refuted(rested, between.disagree(velocity, REFUTED_PX))
     velocity *= moves
-    return Followed(
+    found = Followed(
         time_s=time_s,
         velocity=velocity,
         moves=moves,
@@ -77,6 +82,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0) -> Fol
         unchanged=np.where(moves, np.int16(0), unchanged),
         step=lights.step,
     )
+    return found if choose is None else choose(lights, proposals, found, ~stirs)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,10 +101,10 @@ class _Chosen:
         np.copyto(self.wide, other.wide, where=where)
 
 
-def _best(lights: AllLights, between: BetweenLights, wide_rest: Floats) -> _Chosen:
+def _best(lights: AllLights, between: BetweenLights, proposals: Sequence[Floats], wide_rest: Floats) -> _Chosen:
     """Return, of all proposed velocities, the one for every pixel along which plates are the most alike. Far ones are
     proposed where much of the picture is puzzling; under few lights they must explain clearly more."""
-    near = _most_alike(lights, lights.proposed())
+    near = _most_alike(lights, proposals)
     puzzling = np.minimum(near.wide, wide_rest) > PUZZLING * lights.count
     if np.mean(puzzling & lights.stays(near.velocity)) > PUZZLED:
         far = _most_alike(lights, lights.proposed_far())

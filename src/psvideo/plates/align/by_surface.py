@@ -1,0 +1,198 @@
+"""Which velocity brings the plates of all lights to one surface: chosen there, piece by piece, where shading misleads.
+
+Shading makes plates of one light, a round apart, look more alike along a false velocity than along the true one where
+things turn. Of four distant lights and more a matte surface explains the plates of all, brought to the instant, only
+where they lie on each other. What some light does not reach tells nothing, and goes along with what is around it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Codes8, Doubles, Flags, Floats
+from psvideo.plates.align.as_they_are import Lamps
+from psvideo.plates.align.velocity.all_lights import AllLights
+from psvideo.plates.align.velocity.brightness import light_of
+from psvideo.plates.align.velocity.flow import Sketch
+from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, odd_width
+from psvideo.plates.align.velocity.moving import FINE_PX, GROWN, GROWN_PX, WINDOW_PX
+from psvideo.plates.align.velocity.moving_kernel import moved_rows
+
+MATTE = np.float32(0.05)
+"""What no surface explains of light, as a share of it, counts half where it is so much."""
+LEAST_LIT, CLIPPED = np.float32(0.03), np.float32(0.95)
+"""As shares of white: less is shadow, more may be clipped."""
+LEFT, MARGIN, FINE_LEFT = np.float32(0.5), np.float32(0.08), np.float32(0.8)
+"""A velocity is taken where it leaves less than the first of what rest and the one found before leave, and less by the
+second; and less than the third over the smaller window: otherwise outlines carry along what is beside them."""
+KNOWN = np.float32(0.5)
+"""At least this share of a window must be lit by all lights."""
+AROUND, FEW = 3, np.float32(0.02)
+"""So often the mean of what was chosen around is offered, too, where it is more than the second of the window."""
+MOST, AS_UNLIKE = np.float32(0.25), np.float32(1.15)
+"""What is not lit by all goes along where more than the first around it was chosen here, and plates are no more unlike
+along it than by the second."""
+LEAST = np.float32(1e-3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Left:
+    """What no surface explains along a ``velocity``, over a ``wide`` and a ``fine`` window, 0 to 1, and where enough is
+    lit to tell, ``known``; all (row, col)."""
+
+    velocity: Floats
+    wide: Floats
+    fine: Floats
+    known: Flags
+
+    def least(self, other: "_Left") -> "_Left":
+        """Return the least that two velocities leave; known is what is along both."""
+        wide, fine = np.minimum(self.wide, other.wide), np.minimum(self.fine, other.fine)
+        return replace(self, wide=wide, fine=fine, known=self.known & other.known)
+
+    def copied(self) -> "_Left":
+        """Return a copy to ``take`` into."""
+        planes = [one.copy() for one in (self.velocity, self.wide, self.fine)]
+        return _Left(velocity=planes[0], wide=planes[1], fine=planes[2], known=self.known.copy())
+
+    def take(self, other: "_Left", where: Flags) -> None:
+        """Take another velocity where it leaves less."""
+        better = where & other.known & ((other.wide < self.wide) | ~self.known)
+        for own, theirs in ((self.velocity, other.velocity), (self.wide, other.wide), (self.fine, other.fine)):
+            np.copyto(own, theirs, where=better)
+        np.copyto(self.known, True, where=better)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BySurface:
+    """Of every light, the number of its pair of plates, or the ``standing`` sketch under which nothing moves; and what
+    no normal and albedo explain of all lights, ``odd`` (some, light): orthonormal rows."""
+
+    places: tuple[int | None, ...]
+    standing: tuple[Codes8 | None, ...]
+    odd: Doubles
+
+    @classmethod
+    def of(
+        cls, lamps: Lamps | None, pairs: Mapping[str, Pair], others: Mapping[str, Sketch | None]
+    ) -> "BySurface | None":
+        """``pairs`` are those of lights under which something moves, ``others`` the sketches of the rest; None where
+        the lights do not tell."""
+        if lamps is None or any(sketch is None for sketch in others.values()):
+            return None
+        given = [pairs[name].before if name in pairs else others[name] for name in lamps.names]
+        whites = np.array([sketch.white for sketch in given if sketch is not None])
+        order = list(pairs)
+        still = {name: sketch.codes for name, sketch in others.items() if sketch is not None}
+        return cls(
+            places=tuple(order.index(name) if name in pairs else None for name in lamps.names),
+            standing=tuple(still.get(name) for name in lamps.names),
+            odd=np.linalg.svd(lamps.matrix / whites[:, None])[0][:, 3:].T,
+        )
+
+    def chosen(self, lights: AllLights, proposals: Sequence[Floats], found: Followed, still: Flags) -> Followed:
+        """Return what was ``found`` with velocities of the ``proposals`` where these bring plates to one surface, and
+        what was found does not. What is ``still`` (row, col) stays."""
+        none = self._left(lights, np.zeros_like(found.velocity))
+        before = none.least(self._left(lights, found.velocity)) if found.moves.any() else none
+        asked = before.known & ~still & (before.wide > MARGIN)
+        if not asked.any():
+            return found
+        best = none.copied()
+        for velocity in proposals:
+            best.take(self._left(lights, velocity), asked)
+        taken, size = _clearly(best, before) & asked, odd_width(GROWN_PX, lights.step)
+        for _ in range(AROUND):
+            if not taken.any():
+                return found
+            around, near = _near(best.velocity, taken, size)
+            best.take(self._left(lights, near), asked & (around > FEW))
+            taken = _clearly(best, before) & asked
+        velocity = np.where(taken, best.velocity, found.velocity)
+        joined = self._joined(lights, velocity, taken, (before, found), still)
+        moves = found.moves | joined
+        return replace(
+            found,
+            velocity=velocity * moves,
+            moves=moves,
+            rests=found.rests & ~joined,
+            unchanged=np.where(moves, np.int16(0), found.unchanged),
+        )
+
+    def _joined(
+        self, lights: AllLights, velocity: Floats, taken: Flags, given: tuple[_Left, Followed], still: Flags
+    ) -> Flags:
+        """Return what is ``taken`` with what goes along with it; put that one's ``velocity`` in."""
+        (before, found), size = given, odd_width(GROWN_PX, lights.step)
+        unlike = np.minimum(lights.unlike(np.zeros_like(velocity)), lights.unlike(found.velocity))
+        least = [AS_UNLIKE * lights.mean(unlike, window) for window in (WINDOW_PX, FINE_PX)]
+        for _ in range(GROWN):
+            around, near = _near(velocity, taken, size)
+            unlike, left = lights.unlike(near), self._left(lights, near)
+            joins = (around > MOST) & ~still & ~taken
+            joins &= (lights.mean(unlike, WINDOW_PX) < least[0]) & (lights.mean(unlike, FINE_PX) < least[1])
+            joins &= ~(left.known & before.known) | ((left.wide <= before.wide) & (left.fine <= before.fine))
+            np.copyto(velocity, near, where=joins)
+            taken = taken | joins
+        return taken
+
+    def _left(self, lights: AllLights, velocity: Floats) -> _Left:
+        """Return what no surface explains along a velocity; of large pictures every second one in rows and columns is
+        asked, as flow is no finer there."""
+        stride, shape = lights.step, lights.shape
+
+        def shown(light: int, _: int) -> Floats:
+            return self._light(lights, light, velocity, stride)
+
+        light = np.stack(over_ranges(shown, len(self.places), each=1))
+        mean = light.mean(axis=0)
+        lit = ((light.min(axis=0) > LEAST_LIT) & (light.max(axis=0) < CLIPPED)).astype(np.float32)
+        square = np.zeros_like(mean)
+        for odd in self.odd.astype(np.float32):
+            square += np.square(np.einsum("l,lrc->rc", odd, light))  # BLAS would cut sums by threads
+        square /= np.square(np.maximum(mean, LEAST_LIT))
+        share = lit * square / (square + MATTE * MATTE)
+
+        def over(values: Floats, window_px: int) -> Floats:
+            return mean_over(values, odd_width(window_px, lights.step * stride))
+
+        def full(values: Floats) -> Floats:
+            return np.asarray(cv2.resize(values, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+
+        wide, fine = (
+            full(np.divide(over(share, px), np.maximum(over(lit, px), LEAST), dtype=np.float32))
+            for px in (WINDOW_PX, FINE_PX)
+        )
+        return _Left(velocity=velocity, wide=wide, fine=fine, known=full(over(lit, WINDOW_PX)) > KNOWN)
+
+    def _light(self, lights: AllLights, light: int, velocity: Floats, stride: int) -> Floats:
+        """Return a light's two plates along a velocity, mixed by how near they are, as shares of white (row, col)."""
+        place, codes = self.places[light], self.standing[light]
+        if place is None:
+            if codes is None:
+                raise ValueError("a light has neither plates nor a sketch")
+            still = cv2.resize(codes, lights.shape[::-1], interpolation=cv2.INTER_AREA)[::stride, ::stride]
+            return light_of(still.astype(np.float32))
+        since_s, until_s = lights.spans_s[place]
+        late = np.clip(since_s / (since_s + until_s), np.float32(0), np.float32(1))
+        total = np.zeros([-(-length // stride) for length in lights.shape], np.float32)
+        for plate, span_s, weight in zip(lights.codes[place], (since_s, -until_s), (1 - late, late), strict=True):
+            out = np.empty_like(total)
+            moved_rows(plate, np.float32(span_s), velocity, stride, 0, len(out), out)
+            total += np.float32(weight) * light_of(out)
+        return total
+
+
+def _clearly(best: _Left, before: _Left) -> Flags:
+    clear = best.wide < np.minimum(LEFT * before.wide, before.wide - MARGIN)
+    return np.asarray(clear & (best.fine < FINE_LEFT * before.fine))
+
+
+def _near(velocity: Floats, taken: Flags, size: int) -> tuple[Floats, Floats]:
+    """Return which share of a window was taken, (row, col), and the mean velocity of that, (2, row, col)."""
+    around = mean_over(taken.astype(np.float32), size)
+    near = [mean_over(plane * taken, size) / np.maximum(around, LEAST) for plane in velocity]
+    return around, np.stack(near)
