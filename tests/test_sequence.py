@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -17,6 +18,7 @@ from psvideo.plates import sequence
 from psvideo.plates.align.velocity.flow import changed, comparable, sketch_of, white_of
 from psvideo.plates.ambient import ambient_off
 from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round, coming, light_plates
 from psvideo.plates.split import split
 from psvideo.report.observe.motion import glimpse, motion_between
@@ -239,3 +241,33 @@ def test_a_thing_that_clips_flashes_of_several_lights_moves_where_it_comes_and_g
     moving = motion_between(seen, glimpse(other, seen.white))
     assert moving is not None
     assert moving.share > 0.05
+
+
+def detail_plate(px: float, noise: float, *, number: int = 0) -> LightPlate:
+    """A wall of fine detail so far to the right, under noise."""
+    rng = np.random.default_rng(5)
+    paint = cv2.GaussianBlur(rng.normal(size=(120, 200)), (0, 0), 0.8)
+    wide = np.asarray(0.4 + 0.1 * paint / paint.std(), np.float32)
+    way = np.array([[1, 0, px - 20], [0, 1, 0]], np.float64)
+    shown = cv2.warpAffine(wide, way, (160, 120), flags=cv2.INTER_CUBIC)
+    image = np.asarray(shown + noise * np.random.default_rng(number + 70).normal(size=shown.shape), np.float32)
+    return LightPlate(
+        light="a", number=number, time_s=0.1 * number, picture=mixture_of(image), seen=np.ones(120, np.bool_)
+    )
+
+
+@pytest.mark.parametrize("px", [0.6, 1.0, 2.3])
+def test_fine_detail_that_goes_by_everywhere_moves_and_is_no_noise(px: float) -> None:
+    seen = glimpse(detail_plate(0, 0.003))
+    found = motion_between(seen, glimpse(detail_plate(px, 0.003, number=1), seen.white))
+    assert found is not None
+    assert found.share > 0.05
+    assert found.speed_px_s == pytest.approx(10 * px, rel=0.25)
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.03])
+def test_noise_before_fine_detail_moves_nothing(noise: float) -> None:
+    seen = glimpse(detail_plate(0, noise))
+    found = motion_between(seen, glimpse(detail_plate(0, noise, number=1), seen.white))
+    assert found is not None
+    assert (found.share, found.speed_px_s) == (0, 0)

@@ -97,6 +97,20 @@ def test_normals_that_lean_while_the_picture_moves_say_nothing_of_the_rig(moving
     assert any("tilted otherwise" in line.found for line in rig_of(one)) == doubted
 
 
+@pytest.mark.parametrize(
+    ("share", "apart_px", "blamed"), [(0.9, 5.0, False), (0.9, 0.0, True), (0.9, 1.0, True), (0.2, 5.0, True)]
+)
+def test_plates_of_a_picture_that_goes_by_as_a_whole_say_nothing_of_the_rig(
+    share: float, apart_px: float, blamed: bool
+) -> None:
+    """Unless they were brought together, or lie hardly apart."""
+    one = Footage().observed(0)
+    one.closely.slopes[:] = [-0.2]
+    one.facts = KeptFacts(replace(facts, moving_share=share) for facts in one.facts)
+    assert any("one surface" in line.found for line in judge_rig(one, apart_px=apart_px)) == blamed
+    assert any("not aligned" in line.found for line in judge_rig(one, apart_px=apart_px)) != blamed
+
+
 def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_not_blamed_alone() -> None:
     one = Footage(solved=True).observed(0)
     one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(20.0, 0.0, 0.0), rest_deg=0.2)]

@@ -6,7 +6,7 @@ from psvideo.report.judge.of_accuracy import accuracy, distance
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import ceiling_of, exposure
 from psvideo.report.judge.of_lamps import lamps
-from psvideo.report.judge.of_motion import motion
+from psvideo.report.judge.of_motion import apart_in_round_px, motion
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
 from psvideo.report.judge.of_steadiness import focus, steadiness
@@ -46,7 +46,8 @@ def judgements(
             swing=timing.swing,
         )
     )
-    lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt))
+    apart_px = 0.0 if aligned else apart_in_round_px(plan, timing, observed)
+    lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt, apart_px=apart_px))
     return (
         *on_time,
         *([read_otherwise(timing.half)] if timing.half else []),

@@ -16,15 +16,23 @@ from psvideo.report.judge.rig_by_plates import (
 )
 from psvideo.report.judge.rig_by_slopes import lights_crossed, surface_shines
 from psvideo.report.judge.rig_of_three import three_lights
+from psvideo.report.judge.typical_error import moves
 from psvideo.report.judge.weak_lamps import weaker_than_rig
 from psvideo.report.judgement import NAMED, Judgement
 from psvideo.report.observe.observed import Observed
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
+MOST_MOVES, APART_PX = 0.5, 3.0
+"""Where more than the first share of the picture moves, by more than the second within a round, plates that were not
+brought together say nothing of the rig: fine detail of a right one gave slopes that agree by -0.2."""
 
-def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> Iterator[Judgement]:
+
+def rig(
+    observed: Observed, *, guessed: bool = False, curve_doubt: str = "", apart_px: float = 0.0
+) -> Iterator[Judgement]:
     """Judge whether the rig's directions and strengths can have made these plates. ``guessed``: which light is which
-    is a guess; ``curve_doubt``: why pictures were likely coded by another curve, where that is known."""
+    is a guess; ``curve_doubt``: why pictures were likely coded by another curve, where that is known; ``apart_px``: how
+    far what moves is from the first plate of a round to the last, 0 where plates were brought together."""
     fit = observed.rig_fit
     firing = observed.firing_lights
     swapped = None if fit is None else lights_exchanged(firing, fit)
@@ -45,7 +53,8 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
         yield shining_surface(fit)
         return
     doubted = [one for one in (curve, wrong, crossed, away, near, None if near else leaning) if one]
-    if doubted and not said and any(one.shows for one in observed.closely.astray):
+    moved = apart_px > APART_PX and moves(observed.facts, share=MOST_MOVES)
+    if doubted and not said and (moved or any(one.shows for one in observed.closely.astray)):
         yield Judgement(
             subject="rig",
             grade="unknown",

@@ -66,10 +66,10 @@ def rig_explains(observed: Observed) -> bool:
     return fit is not None and fit.excess <= HARDLY_OFF
 
 
-def moves(facts: Sequence[InstantFacts]) -> bool:
-    """Return whether a usual round shows motion."""
+def moves(facts: Sequence[InstantFacts], *, share: float = AT_REST) -> bool:
+    """Return whether a usual round shows motion, of more than a ``share`` of the picture."""
     shares = [one.moving_share for one in facts if one.moving_share is not None]
-    return bool(shares) and float(np.median(shares)) > AT_REST
+    return bool(shares) and float(np.median(shares)) > share
 
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:

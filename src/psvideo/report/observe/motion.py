@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
-from psvideo.model.arrays import Bytes, Flags
+from psvideo.model.arrays import Bytes, Flags, Floats
+from psvideo.plates.align.shake.registered import correlation, registered
 from psvideo.plates.align.velocity.flow import TOE, pixel_places
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
@@ -19,8 +20,9 @@ from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, va
 WIDTH_PX = 480
 LEAST_CHANGE, NOISE_FACTOR = 1.5, 5.0
 """Blocks of 8 pixels moved where they changed by more codes than the first, and by the second times their noise."""
-LEAST_BLOCKS = 0.002
-"""A share of the blocks that changed which is no more than chance."""
+LEAST_BLOCKS, FEW_BLOCKS = 0.002, 0.02
+"""A share of the blocks that changed which is no more than chance; and one that is hardly more: little moved, or so
+much that it passes for noise."""
 FASTEST = 0.95
 """The speed reported is that of the fastest twentieth of what moves."""
 BESIDE_PX = 9
@@ -30,6 +32,9 @@ EXPLAINED, DETAIL_PX, SHADING_CODES = 0.7, 9, 12.0
 """What changed is explained where plates differ along the flow by less than this share of what they do at rest,
 over this many pixels: flow that fits by chance leads there and back as well. Less than the last may be shading that
 turns."""
+WHITE, AGREE, ALIKE = 0.15, 0.02, 0.8
+"""What changes is noise where neighbours change alike by less than the first; and a picture did not shift where one
+shift makes details alike by less than the second more, or by less than the third."""
 FOLLOWED = 0.3
 """Where there and back meet for less than this share of what changed, or explain less of it, flow gives no speed."""
 
@@ -95,6 +100,9 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     one, other = (picture.codes.astype(np.float32) for picture in (before, after))
     changed = _changed(one, other)
     still = Motion(speed_px_s=0.0, share=0.0)
+    if changed.mean() <= FEW_BLOCKS and (way_px := _shifted_px(one, other) * before.scale):
+        speed_px_s = way_px / abs(after.time_s - before.time_s)
+        return Motion(speed_px_s=speed_px_s, share=1.0, changed=np.ones_like(changed))
     if changed.mean() <= LEAST_BLOCKS:
         return still
     search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
@@ -110,17 +118,36 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     return Motion(speed_px_s=speed, share=float(returns.mean()), changed=_well_within(changed))
 
 
-def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _changed(one: Floats, other: Floats) -> NDArray[np.bool_]:
     """Return where two pictures differ by more than noise, (row, col). A change of all light by one factor is none."""
-    early, late = one[::2, ::2], other[::2, ::2]  # medians of a quarter are as good
-    bright = early > 30
-    level = median(late[bright] / early[bright]) if bright.any() else 1.0
-    change = other - one * np.float32(level)
+    change = _change(one, other)
     mean = cv2.blur(change, (3, 3))
     noise = 1.4826 * median(np.abs(change - mean)[::2, ::2]) * np.sqrt(9 / 8)
     squares = cv2.blur(mean * mean, (8, 8))
     local = np.sqrt(np.maximum(squares, 0))  # running sums may leave a little less than nothing
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))
+
+
+def _change(one: Floats, other: Floats) -> Floats:
+    """Return by how much pictures differ beside one factor of all light."""
+    early, late = one[::2, ::2], other[::2, ::2]  # medians of a quarter are as good
+    bright = early > 30
+    level = median(late[bright] / early[bright]) if bright.any() else 1.0
+    return np.asarray(other - one * np.float32(level), np.float32)
+
+
+def _shifted_px(one: Floats, other: Floats) -> float:
+    """Return by how much a picture shifted as a whole, 0 where it did not: fine detail that goes by everywhere looks
+    like noise, but neighbours go by together, and one shift brings it back."""
+    change = _change(one, other)[::2]
+    size = max(float(np.mean(change * change, dtype=np.float64)), 1e-12)
+    if abs(float(np.mean(change[:, 1:] * change[:, :-1], dtype=np.float64))) < WHITE * size:
+        return 0.0
+    details = [np.asarray(picture - cv2.blur(picture, (DETAIL_PX, DETAIL_PX)), np.float32) for picture in (one, other)]
+    shift = registered(*details)
+    if shift.alike < max(correlation(*details) + AGREE, ALIKE):
+        return 0.0
+    return float(np.hypot(*shift.px))
 
 
 def _well_within(changed: Flags) -> Flags:
