@@ -665,6 +665,43 @@ def test_flashes_that_either_end_of_an_exposure_may_cut_are_refused(
             timing_of(plan, profiles)
 
 
+@pytest.mark.parametrize(
+    ("seed", "slip", "missing", "unique"), [(3, 0.6, 33, False), (4, 0.3, 33, False), (2, 0.3, 74, True)]
+)
+def test_a_strobe_nearly_in_step_with_a_rolling_shutter_is_timed_rightly_or_refused(
+    seed: int, slip: float, missing: int, unique: bool, make_plan: PlanMaker
+) -> None:
+    """A cycle of two frames and a little, and light that ripples: where one of them was missing all flashes were 1.4 ms
+    off, and 25 to 77 us were claimed. ``slip``: by how many flashes the clocks drift apart within the clip."""
+    plan = make_plan(
+        height_px=ROWS,
+        width_px=COLUMNS,
+        shutter=0.5,
+        readout=0.999,
+        duration_s=0.00135,
+        fps=Fraction(120),
+        dark=False,
+        clock_tolerance_ppm=10_000,
+    )
+    cycle_s = 2 * plan.camera.frame_period_s + slip * plan.shortest_flash_s / 37
+    plan = replace(plan, dark_s=cycle_s / len(plan.flashes) - plan.shortest_flash_s)
+    rng, down = np.random.default_rng(seed), np.linspace(0, 1, ROWS)[:, None] * np.ones(COLUMNS)
+    waves = {slot: np.sin(rng.uniform(1, 9) * down + rng.uniform(0, 6)) for slot in plan.lit_slots}
+    walls = {slot: np.asarray(0.3 + 0.2 * wave, np.float32) for slot, wave in waves.items()}
+    clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=0.0)
+    shot = expose(walls, plan, frames=75, clock=clock, noise=NOISE, bits=12, seed=seed)
+    at_s = plan.camera.frame_period_s * np.arange(75)[:, None] + plan.camera.row_time_s * np.arange(ROWS)
+    profiles = shot.frames.mean(axis=2, dtype=np.float64) + 0.05 + 0.03 * np.sin(2 * np.pi * 100 * at_s)
+    profiles = np.delete(profiles, missing, axis=0)
+    if unique:
+        true_s = np.array([flash.start_s for flash in shot.flashes])
+        found_s = timing_of(plan, profiles).start_s
+        assert np.abs(true_s[:, None] - found_s).min(axis=0).max() < 5e-6
+    else:
+        with pytest.raises(NoStrobeError, match="flashes at other times explain the picture as well"):
+            timing_of(plan, profiles)
+
+
 def locked(plan: Plan, shutter: float) -> Plan:
     """Return a plan whose flashes come exactly once a frame, under a global shutter."""
     period_s = plan.camera.frame_period_s

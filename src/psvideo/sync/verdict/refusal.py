@@ -16,6 +16,8 @@ from psvideo.sync.verdict.rivals import CLEARLY, Rival, best_rival, count_rivals
 
 ALIKE = 0.2
 """Frames that see the cycle at times which differ by less than this share of the shortest flash are alike."""
+SLOW = 3.0
+"""A strobe that moves by no more than this many shortest flashes within a clip nearly keeps step with its frames."""
 STEADY = 0.02
 """Rows that change by less than this share of their light from frame to frame saw no strobe."""
 ALONE = 0.15
@@ -84,12 +86,25 @@ def shows_the_same(plan: Plan, rows: Profiles, beat: Beat) -> bool:
     """
     if beat.row_time_s == 0.0:
         return False
+    return _few_kinds(plan, rows, beat, ALIKE)
+
+
+def shows_few(plan: Plan, rows: Profiles, beat: Beat) -> bool:
+    """Return whether frames see no more than so many, each of them moved by ``SLOW`` flashes at most in the course of
+    the clip: a subject that moves may explain that as well as flashes that do."""
+    return _few_kinds(plan, rows, beat, SLOW)
+
+
+def _few_kinds(plan: Plan, rows: Profiles, beat: Beat, moved: float) -> bool:
+    """Return whether frames see the cycle around no more times than a row has brightnesses, and at those within so many
+    of the shortest flash."""
     cycle_s, alike_s = plan.cycle_s * beat.clock.rate, ALIKE * plan.shortest_flash_s
     at_s = np.sort(rows.frame_start_s % cycle_s)
     gaps_s = np.diff(np.append(at_s, at_s[0] + cycle_s))
     apart = gaps_s > alike_s
     kinds = max(int(apart.sum()), 1)
-    return kinds <= len(plan.lit_slots) + 1 and cycle_s - gaps_s[apart].sum() < kinds * alike_s
+    within_s = cycle_s - gaps_s[apart].sum()
+    return kinds <= len(plan.lit_slots) + 1 and within_s < kinds * moved * plan.shortest_flash_s
 
 
 def in_step_with_frames(plan: Plan) -> str:
