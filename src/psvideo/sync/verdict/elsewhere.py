@@ -31,7 +31,7 @@ SHORT = 3.0
 ROWS, FRAMES = 12, 240
 """Rows, and frames in a row, among which other places are looked for; they are then fitted to all frames."""
 ROLLING_ROWS, ROWS_EACH = 36, 4
-"""Rows where they open one after another, or as many as leave the shortest flash this many that it spans."""
+"""Rows where they open one after another; of a strobe nearly in step as many as leave the shortest flash the second."""
 TRIED = 12
 """The best places of each search that are fitted."""
 NEAR, TURNS = (-0.6, -0.4, -0.25, 0.25, 0.4, 0.6), 21
@@ -65,7 +65,8 @@ def fits_elsewhere(plan: Plan, found: ClipFit) -> Beat | None:
     in_step = not at_once and _likely(plan, beat)
     if found.across > 0.0 or (in_step and not shows_few(plan, found.rows, beat)):
         return None
-    few = replace(found.rows.binned(ROWS if at_once else _rolling_rows(plan, found.rows, beat)), restless=None)
+    rolling = _rows_in_step(plan, found.rows, beat) if in_step else ROLLING_ROWS
+    few = replace(found.rows.binned(ROWS if at_once else rolling), restless=None)
     known = unexplained(plan, few, beat)
     most = ALIKE * robust_loss(few, known, known) + LITTLE
     apart_s = (FAR if in_step else APART) * plan.shortest_flash_s
@@ -79,7 +80,7 @@ def fits_elsewhere(plan: Plan, found: ClipFit) -> Beat | None:
     return None
 
 
-def _rolling_rows(plan: Plan, rows: Profiles, beat: Beat) -> int:
+def _rows_in_step(plan: Plan, rows: Profiles, beat: Beat) -> int:
     """Return how many rows are enough, and leave the shortest flash a few that it spans."""
     return max(ROLLING_ROWS, int(np.ceil(ROWS_EACH * beat.row_time_s * len(rows.place) / plan.shortest_flash_s)))
 
