@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from row_means import rows_of
 from scipy.ndimage import gaussian_filter  # type: ignore[attr-defined]
 
 from psvideo.errors import NoStrobeError, PsvideoError
@@ -56,18 +57,6 @@ def filmed(plan: Plan, *, frames: int = FRAMES, phase_s: float = 0.0123, **optio
     shot = expose(plates, plan, frames=frames, clock=clock, noise=NOISE, bits=12, **options)  # type: ignore[arg-type]
     profiles: np.ndarray = shot.frames.mean(axis=2, dtype=np.float64)
     return profiles
-
-
-def rows_of(plan: Plan, profiles: np.ndarray) -> Profiles:
-    """Return row profiles (frame, row) as rows of one window."""
-    frames, height = profiles.shape
-    return Profiles(
-        value=profiles,
-        index=np.arange(frames),
-        period_s=plan.camera.frame_period_s,
-        place=np.arange(float(height)),
-        window_start=np.zeros(1, np.int64),
-    )
 
 
 def timing_of(plan: Plan, profiles: np.ndarray) -> Timing:
@@ -468,7 +457,7 @@ def test_a_clock_far_off_the_plan_s_must_explain_more_than_one_that_is_not(plan:
 
 
 def test_a_fit_that_is_unsure_by_much_of_a_flash_must_explain_most(plan: Plan) -> None:
-    """Of footage that was turned by 90 degrees some fit half of it and leaves times open by a third of a flash."""
+    """As of footage that was turned by 90 degrees, which a camera may explain that leaves times open."""
     found = find(plan, rows_of(plan, filmed(plan)))
 
     def unsure(share: float) -> ClipFit:

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from row_means import rows_of
 
 from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.model.arrays import Doubles
@@ -55,17 +56,6 @@ def with_restart(
     before, after = shot_of(plan, alike=alike), shot_of(plan, PHASE_S + late_s, alike=alike)
     frames = np.concatenate([before.frames[:cut], after.frames[cut:]])
     return (before, after), frames.mean(axis=2, dtype=np.float64)
-
-
-def rows_of(plan: Plan, profiles: Doubles) -> Profiles:
-    frames, height = profiles.shape
-    return Profiles(
-        value=profiles,
-        index=np.arange(frames),
-        period_s=plan.camera.frame_period_s,
-        place=np.arange(float(height)),
-        window_start=np.zeros(1, np.int64),
-    )
 
 
 def off_s(

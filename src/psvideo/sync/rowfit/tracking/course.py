@@ -69,6 +69,7 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows))
     tracked = without_false_holes(plan, kept, tracked, seed.frames)
     tracked = replace(tracked, beat=replace(tracked.beat, clock=clock_through(plan, tracked)))
+    # numbers that go on one by one but for holes: the seed only guessed where those lie, and they are settled anew
     numbered = kept.index if regular_step(kept.index, numbering.plain) != 1 else numbering.plain
     index, unsure = settled(plan, replace(kept, index=numbered), tracked.index, tracked.beat)
     placed = ends(plan, kept, index, tracked.beat)
