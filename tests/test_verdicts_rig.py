@@ -29,6 +29,7 @@ from psvideo.report.judgement import verdict_of
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.rig_and_curve.slopes import coarse_normals
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
+from psvideo.report.observe.steadiness import Change
 
 
 @pytest.mark.parametrize(
@@ -94,6 +95,18 @@ def test_normals_that_lean_while_the_picture_moves_say_nothing_of_the_rig(moving
     one = Footage(solved=True).observed(0)
     turn_deg = (12.0, 9.0, -8.0)
     one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=turn_deg, rest_deg=18.0, moving_share=moving_share)]
+    assert any("tilted otherwise" in line.found for line in rig_of(one)) == doubted
+
+
+@pytest.mark.parametrize(("change_deg", "gain", "doubted"), [(0.3, 0.2, True), (1.4, 0.2, False), (1.4, 0.6, True)])
+def test_normals_that_change_from_result_to_result_doubt_a_rig_only_where_leaning_gains_much(
+    change_deg: float, gain: float, doubted: bool
+) -> None:
+    """Normals of a right rig, of a still life in H.264, changed by 1.4 degrees and leaned by 9 at a gain of 0.2."""
+    one = Footage(solved=True).observed(0)
+    one.closely.leans[:] = [Lean(lean_deg=9.2, gain=gain, turn_deg=(0.5, 1.7, 0.3), rest_deg=8.9)]
+    change = Change(normals_deg=change_deg, albedo_percent=1.3, level_percent=0.0)
+    one.facts = KeptFacts(replace(facts, change=change) for facts in one.facts)
     assert any("tilted otherwise" in line.found for line in rig_of(one)) == doubted
 
 

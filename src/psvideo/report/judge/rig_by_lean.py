@@ -17,6 +17,9 @@ wrong in a way of their own, which accuracy says, normals lean by up to 3.5 time
 whole: 25 times on virtual subjects, 2 to 4 times on photographs.)"""
 SURELY_LEANING = 0.5
 """Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
+STEADY_DEG, QUIET_DEG = 1.0, 2.0
+"""Where normals at rest change by more than the first between results, or noise turns a typical one by more than the
+second, a smaller gain may be noise: a right rig in H.264 leaned by 9 to 12 degrees at gains of 0.14 to 0.22."""
 REST, EXACT_LIGHTS = 1 / 3, 3
 """A rig is turned as a whole, or a lens is shifted, where so little of the change is none; what is wrong of three
 lights is one change as well. More lights that are each wrong in a way of their own make normals that no such change
@@ -39,7 +42,8 @@ def normals_lean(observed: Observed) -> Judgement | None:
         return None
     usual = sorted(at_rest, key=lambda one: one.lean_deg)[len(at_rest) // 2]
     shown_deg = off_deg(observed) or 0.0
-    if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= BY_LEANING:
+    clearly = BY_LEANING if quiet(observed.facts, change_deg=STEADY_DEG, noise_deg=QUIET_DEG) else SURELY_LEANING
+    if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= clearly:
         return None
     if usual.off_axis is not None and (usual.least_deg or 0.0) < REST * usual.lean_deg:
         return _off_axis(usual, usual.off_axis)

@@ -72,7 +72,8 @@ def moves(facts: Sequence[InstantFacts], *, share: float = AT_REST) -> bool:
     return bool(shares) and float(np.median(shares)) > share
 
 
-def quiet(facts: Sequence[InstantFacts]) -> bool:
-    """Return whether normals are steady enough to be compared with each other."""
+def quiet(facts: Sequence[InstantFacts], *, change_deg: float = NOISY_DEG, noise_deg: float = NOISY_DEG) -> bool:
+    """Return whether normals are steady enough to be compared with each other: those at rest change by less than
+    ``change_deg`` between results, and noise turns a typical one by less than ``noise_deg``."""
     known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
-    return by_noise_deg(facts) < NOISY_DEG and (not known or float(np.median(known)) < NOISY_DEG)
+    return by_noise_deg(facts) < noise_deg and (not known or float(np.median(known)) < change_deg)
