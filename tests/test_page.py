@@ -131,6 +131,32 @@ def test_gaps_of_the_subject_are_hatched_and_what_lies_around_it_is_not(browser:
     assert differs.sum() < 0.1 * rows * cols
 
 
+@pytest.mark.parametrize(("trusted", "said"), [(0, "nothing is trusted"), (29, "only 2 % is trusted")])
+def test_a_picture_of_which_next_to_nothing_is_trusted_is_shown_and_said_so(
+    trusted: int, said: str, browser: Browser, tmp_path: Path
+) -> None:
+    """Hatched all over it would show nothing at all; V hatches it all the same."""
+    made = small.results(tmp_path / "out")
+    _, inside = small.ball()
+    sure = inside & (np.cumsum(inside).reshape(inside.shape) <= trusted)
+    small.write(made / "valid" / f"take_valid.{small.FIRST}.exr", {"Y": sure.astype(np.float16)}, small.FIRST)
+    with serving(made) as server:
+        page = Watched(browser.new_context(viewport=SMALL).new_page()).open(server.url)
+        box = page.locator(".pane").first.bounding_box()
+        assert box is not None
+        first = _drawn(page, box)
+        assert said in page.locator(".caption").first.inner_text()
+        assert not page.locator("#mark-invalid").is_checked()
+        page.keyboard.press("v")
+        settled(page)
+        assert page.locator("#mark-invalid").is_checked()
+        assert "trusted" not in page.locator(".caption").first.inner_text()
+        assert (np.abs(first.astype(int) - _drawn(page, box)).max(axis=2) > 8).mean() > 0.05
+        page.keyboard.press("ArrowRight")
+        shown(page, small.FIRST + 1)
+        assert "trusted" not in page.locator(".caption").first.inner_text()
+
+
 def _drawn(page: Page, box: Any) -> np.ndarray:
     page.wait_for_function("() => !psvideo.loader.loading")
     settled(page)

@@ -12,6 +12,7 @@ import pytest
 from watched_page import KEY, Watched, albedo, lambert, light, relit_in, settled, shown
 
 from psvideo.errors import UsageError
+from psvideo.inspect.describe import describe
 from psvideo.page import page_server, show_of, side_by_side, write_single_page
 
 
@@ -63,13 +64,29 @@ def test_results_side_by_side_are_each_relit_as_they_are_under_the_same_light(
         thread.join()
 
 
-@pytest.mark.parametrize(("fps", "shown"), [(1 / 12, False), (24.0, True)])
-def test_results_of_photographs_have_no_time(
-    fps: float, shown: bool, folder: Path, tmp_path: Path, watched: Watched
+@pytest.mark.parametrize(
+    ("fps", "place", "rate"),
+    [(0.0, "1 of 6 pictures", ""), (1 / 12, "1 of 6 pictures", ""), (24.0, "0.100 s", "24.00 fps")],
+)
+def test_results_of_photographs_are_counted_and_have_no_time(
+    fps: float, place: str, rate: str, folder: Path, tmp_path: Path, watched: Watched
 ) -> None:
     write_single_page(replace(show_of(folder), fps=fps), tmp_path / "page.html", width_px=64, count=small.COUNT)
     page = watched.open((tmp_path / "page.html").as_uri())
-    assert [bool(page.locator(f"#{name}").inner_text()) for name in ("clock", "rate")] == [shown, shown]
+    assert [page.locator(f"#{name}").inner_text() for name in ("clock", "rate")] == [place, rate]
+    page.keyboard.press("Space")
+    page.wait_for_function("() => psvideo.state.at > 0")
+
+
+def test_what_stills_wrote_is_of_photographs_whatever_rate_its_files_name_for_other_programs(tmp_path: Path) -> None:
+    made = small.results(tmp_path / "out")
+    filmed = show_of(made)
+    assert (round(filmed.fps, 2), filmed.timing is None) == (29.97, False)
+    (made / "setup").mkdir()
+    (made / "setup" / "plan.toml").write_text("")
+    photographed = show_of(made)
+    assert (photographed.fps, photographed.timing is None) == (0, True)
+    assert not [finding.text for finding in describe(made).findings if "results a second" in finding.text]
 
 
 def test_what_cannot_stand_side_by_side_is_named(folder: Path, tmp_path: Path) -> None:

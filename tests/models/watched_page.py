@@ -40,9 +40,11 @@ def serving(folder: Path) -> Iterator[PageServer]:
     with page_server(show_of(folder), port=0) as one:
         thread = threading.Thread(target=one.serve_forever)
         thread.start()
-        yield one
-        one.shutdown()
-        thread.join()
+        try:
+            yield one
+        finally:  # or a test that fails never ends
+            one.shutdown()
+            thread.join()
 
 
 class Watched:

@@ -6,6 +6,8 @@ from psvideo.errors import PsvideoError
 
 FRAMES, PLAN_FILE = "frames", "plan.toml"
 """What may hold a clip's frames in its folder, and what its plan is called there."""
+SETUP = "setup"
+"""The folder in a result of photographs that holds how they were taken to be: plan, rig, and the lights as a list."""
 
 
 def find_plan(path: Path, *, given: Path | None = None) -> Path:

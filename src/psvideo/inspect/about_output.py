@@ -8,7 +8,7 @@ from pathlib import Path
 from psvideo.clip.decode import exr
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError
-from psvideo.formats.clip_layout import PLAN_FILE
+from psvideo.formats.clip_layout import PLAN_FILE, SETUP
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.quantities import ALWAYS, QUANTITIES
@@ -25,6 +25,12 @@ def is_plates(folder: Path) -> bool:
 def is_results(folder: Path) -> bool:
     """Return whether ``normals`` wrote this folder."""
     return any((folder / "normals").glob("*.exr"))
+
+
+def is_of_photographs(folder: Path) -> bool:
+    """Return whether ``stills`` wrote this folder: the rate that its files name is one that programs know, and no one
+    filmed at it."""
+    return (folder / SETUP / PLAN_FILE).is_file()
 
 
 def solved_takes_in(folder: Path) -> tuple[Path, ...]:
@@ -101,7 +107,7 @@ def _findings(folder: Path, sequences: dict[str, list[Path]], kind: str) -> Iter
         yield ok(f"{name}: {counted(len(files), 'file')}, {span}{size}, channels {', '.join(channels)}{unit}")
     said = _said_in_headers(sequences)
     if said["space"] is not None:
-        yield ok(_in_words(said))
+        yield ok(_in_words(said, photographs=is_of_photographs(folder)))
     if kind == "results folder":
         yield from _results_go_together(sequences)
     if (folder / "timing.json").is_file():
@@ -112,13 +118,13 @@ SLOWEST = Fraction(1, 2)
 """Results a second below which they are no film, but photographs: their rate says nothing."""
 
 
-def _in_words(said: dict[str, Fact]) -> str:
-    """Say in which frame and colours results are, and how fast they go."""
+def _in_words(said: dict[str, Fact], *, photographs: bool) -> str:
+    """Say in which frame and colours results are, and how fast they go, where they are of no photographs."""
     direction = {"up": "y up (OpenGL)", "down": "y down (DirectX)"}.get(str(said["y"]), "y is not said")
     parts = [f"normals in {said['space']} space, {direction}"]
     if said["colour"] is not None:
         parts.append(f"albedo in {said['colour']}, linear")
-    if said["fps"] is not None and Fraction(str(said["fps"])) >= SLOWEST:
+    if said["fps"] is not None and not photographs and Fraction(str(said["fps"])) >= SLOWEST:
         parts.append(f"{float(Fraction(str(said['fps']))):.6g} results a second")
     if said["time_code"] is not None:
         parts.append(f"from time code {said['time_code']}")

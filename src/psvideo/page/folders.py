@@ -9,7 +9,7 @@ from psvideo.clip.folder import MOVIES
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import read_json
 from psvideo.formats.timing_json import read_timing, timing_record
-from psvideo.inspect.about_output import is_plates, is_results, solved_takes_in
+from psvideo.inspect.about_output import is_of_photographs, is_plates, is_results, solved_takes_in
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.units import counted
 from psvideo.page.file_times import file_times_s
@@ -78,6 +78,8 @@ def _results(path: Path) -> Show:
     times_s = file_times_s(first, rate_of(first_header(first)))
     sequences = [sequence_of(path / row.name, row, like=(tuple(sorted(first)), times_s)) for row in known]
     width_px, height_px, fps = size_and_rate(path / known[0].name)
+    if is_of_photographs(path):
+        fps = 0.0
     report = _report(path / "report.json")
     return Show(
         name=path.resolve().name if not report else str(report.get("clip", path.name)),
@@ -90,7 +92,7 @@ def _results(path: Path) -> Show:
         findings=tuple(str(sentence) for sentence in _list(report.get("findings"))),
         facts=dict(_facts(report)),
         report=path / "report.html" if (path / "report.html").is_file() else None,
-        timing=_timing_of(path / "timing.json"),
+        timing=_timing_of(path / "timing.json") if fps else None,  # photographs were flashed at no time
     )
 
 

@@ -66,11 +66,11 @@ def first_header(files: Mapping[int, Path]) -> Mapping[str, str | int | float | 
 
 
 def size_and_rate(folder: Path) -> tuple[int, int, float]:
-    """Return width and height in pixels of a folder's pictures, and their rate in hertz."""
+    """Return width and height in pixels of a folder's pictures, and their rate in hertz; 0 where none is known."""
     head = first_header(files_in(folder))
     return int(head["width_px"] or 0), int(head["height_px"] or 0), rate_of(head)
 
 
 def rate_of(head: Mapping[str, str | int | float | None]) -> float:
-    """Return the rate that a header says, in hertz; 24 where it says none."""
-    return float(Fraction(str(head.get("framesPerSecond", "24"))))
+    """Return the rate that a header says, in hertz; 0 where it says none, as of photographs."""
+    return float(Fraction(str(head.get("framesPerSecond", "0"))))

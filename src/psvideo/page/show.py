@@ -44,7 +44,10 @@ class ShownSequence:
 
 @dataclass(frozen=True, kw_only=True)
 class Show:
-    """Everything that the page can show of one folder. The first sequence's timeline is the one that is scrubbed."""
+    """Everything that the page can show of one folder. The first sequence's timeline is the one that is scrubbed.
+
+    ``fps`` is 0 where no rate is known: pictures are counted then, and have no time.
+    """
 
     name: str
     kind: Literal["results", "plates", "clip"]

@@ -77,7 +77,7 @@ function actions(app, event) {
     "]": () => app.change({ exposure: state.exposure + 0.25 }),
     a: () => app.expose(),
     c: () => app.change({ channels: (state.channels + 1) % 5 }),
-    v: () => app.change({ markInvalid: !state.markInvalid }),
+    v: () => app.mark(!app.marks()),
     t: () => app.toggleTiming(),
     p: () => app.togglePanel(),
     0: () => app.change({ zoom: 1, centre: [0.5, 0.5] }),

@@ -8,6 +8,7 @@ const WIDTHS = [240, 480, 960, 1920, 3840, 7680];
 const QUICK_WIDTH = 960;
 const WHITE = 0.8;
 const MOST_POINTS = 20000;
+const LITTLE_TRUSTED = 0.05; // of the subject: hatching the rest would hide the picture
 
 // Which of several results a content or a sequence belongs to: nothing for the first, "r2." for the second.
 export function resultOf(id) {
@@ -162,6 +163,34 @@ function aroundOf({ around, aroundTurn, aroundStrength }) {
   return heldAround.numbers;
 }
 
+const trustedShares = new WeakMap();
+
+// The share of the subject that is trusted in a picture which is not hatched, because hatching would hide it; null where
+// enough is trusted, or where the hatching was chosen.
+export function sparedShare(app, content, blocks) {
+  const from = resultOf(content);
+  const sequence = sequenceOf(app, content);
+  const [valid, main] = [blocks[`${from}valid`], blocks[sequence.id]];
+  if (!app.state.markInvalid || app.state.markChosen || !sequence.hatched || !valid?.data || !main?.data) return null;
+  if (!trustedShares.has(valid)) trustedShares.set(valid, trustedShare(valid, blocks[`${from}normals`]?.data ? blocks[`${from}normals`] : main));
+  const share = trustedShares.get(valid);
+  return share < LITTLE_TRUSTED ? share : null;
+}
+
+function trustedShare(valid, picture) {
+  let [trusted, all] = [0, 0];
+  const step = Math.max(1, Math.floor(Math.sqrt(valid.width * valid.height / MOST_POINTS)));
+  for (let row = 0; row < valid.height; row += step) {
+    for (let col = 0; col < valid.width; col += step) {
+      const [u, v] = [(col + 0.5) / valid.width, (row + 0.5) / valid.height];
+      const sure = pixelAt(valid, u, v)[0] > 0.5;
+      trusted += sure;
+      all += sure || pixelAt(picture, u, v).some((value) => value !== 0);
+    }
+  }
+  return all ? trusted / all : 1;
+}
+
 // Everything that a stage needs to draw one pane; null where its picture is not there.
 export function lookOf(app, content, blocks) {
   const sequence = sequenceOf(app, content);
@@ -178,7 +207,7 @@ export function lookOf(app, content, blocks) {
   return {
     kind, sequence, from, main, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
     place: kind === "position" ? stored(app, from, present[main]) : place, ...view,
-    markInvalid: markInvalid && Boolean(present.valid) && sequence.hatched,
+    markInvalid: markInvalid && Boolean(present.valid) && sequence.hatched && sparedShare(app, content, blocks) === null,
     specular, around: kind === RELIT ? aroundOf(app.state) : null,
     exposure: 2 ** exposure * baseExposure(app, content, present),
     range: rangeOf(app, sequence, present),

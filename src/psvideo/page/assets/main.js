@@ -2,13 +2,13 @@
 import { Source, fromPage, fromServer } from "./source.js";
 import { Loader } from "./loader.js";
 import { openStage } from "./stage.js";
-import { RELIT, contentsOf, isRelit, lookOf, windowOf } from "./looks.js";
+import { RELIT, contentsOf, isRelit, lookOf, sparedShare, windowOf } from "./looks.js";
 import { buildPanes, paneCount, tellPanes } from "./panes.js";
 import { buildPanel, tellControls, tellLights } from "./panel.js";
 import { MOST_LIGHTS, newLight } from "./lights.js";
 import { listenToPointers } from "./gestures.js";
 import { buildHelp, listenToKeys } from "./keys.js";
-import { listenToTransport, tellTransport } from "./transport.js";
+import { listenToTransport, playedRate, tellTransport } from "./transport.js";
 import { placeUnder, tellPixel } from "./probe.js";
 import { TimingView } from "./timing.js";
 import { FLAT_WIDTH, FlatStage } from "./flat.js";
@@ -119,7 +119,7 @@ class App {
   tick(now) {
     if (!this.state.playing) return;
     this.playedFrom ??= { time: now, at: this.state.at };
-    const steps = Math.floor((now - this.playedFrom.time) / 1000 * this.index.fps);
+    const steps = Math.floor((now - this.playedFrom.time) / 1000 * playedRate(this.index));
     const at = (this.playedFrom.at + steps) % this.master.numbers.length;
     if (at !== this.state.at) this.run(at);
     requestAnimationFrame((next) => this.tick(next));
@@ -174,6 +174,16 @@ class App {
     this.change({ lights });
   }
 
+  // Whether what is not valid is hatched in what is shown.
+  marks() {
+    const blocks = this.loader.blocks();
+    return this.state.markInvalid && this.panes().every((content) => sparedShare(this, content, blocks) === null);
+  }
+
+  mark(markInvalid) {
+    this.change({ markInvalid, markChosen: true });
+  }
+
   expose() {
     this.bases.clear();
     this.ranges.clear();
@@ -187,10 +197,11 @@ class App {
   }
 
   async toggleTiming() {
+    if (!this.index.timing) return;
     const section = document.getElementById("timing");
     section.hidden = !section.hidden;
     document.getElementById("timing-button").setAttribute("aria-pressed", String(!section.hidden));
-    if (!section.hidden && this.index.timing && !this.timing) await this.readTiming();
+    if (!section.hidden && !this.timing) await this.readTiming();
     this.draw();
   }
 
@@ -293,7 +304,7 @@ function firstState(app) {
   const contents = [0, 1, 2, 3].map((place) => first[Math.min(place, first.length - 1)]);
   return { at: 0, playing: false, layout: relit.length > 2 ? "four" : ids.length > 1 && app.index.kind !== "clip" ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
     channels: 0, lights: [newLight([])], selected: 0, specular: 0, exponent: 30, relief: 1, zoom: 1, centre: [0.5, 0.5],
-    around: "none", aroundTurn: 0, aroundStrength: 0.6, dragged: false, markInvalid: app.sequences.has("valid") };
+    around: "none", aroundTurn: 0, aroundStrength: 0.6, dragged: false, markInvalid: app.sequences.has("valid"), markChosen: false };
 }
 
 function listenToBar(app) {

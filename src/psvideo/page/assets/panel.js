@@ -117,7 +117,7 @@ function displayPart(app) {
   const channels = element("select", { id: "channels" }, ...["All", "Red, x", "Green, y", "Blue, z", "Luminance"].map((label, value) => new Option(label, value)));
   channels.addEventListener("change", () => app.change({ channels: Number(channels.value) }));
   const marked = element("input", { type: "checkbox", id: "mark-invalid", checked: app.state.markInvalid });
-  marked.addEventListener("change", () => app.change({ markInvalid: marked.checked }));
+  marked.addEventListener("change", () => app.mark(marked.checked));
   const inside = [exposure, element("label", { className: "slider" }, element("span", { textContent: "Channels" }), channels)];
   if (app.sequences.has("valid")) {
     inside.push(element("label", { className: "tick" }, marked, element("span", { textContent: "Hatch what is not valid" })));
@@ -132,11 +132,11 @@ function displayPart(app) {
 
 // Bring the controls in line with what keys have changed.
 export function tellControls(app) {
-  const { exposure, channels, markInvalid } = app.state;
+  const { exposure, channels } = app.state;
   setValue("exposure", exposure);
   setValue("channels", channels);
   const marked = document.getElementById("mark-invalid");
-  if (marked) marked.checked = markInvalid;
+  if (marked) marked.checked = app.marks();
 }
 
 function setValue(id, value) {

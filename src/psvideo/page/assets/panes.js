@@ -1,6 +1,6 @@
 // The panes over the canvas: what each shows, its caption, its legend, and the handles of the lights.
 import { colourAt, paletteOf } from "./palettes.js";
-import { isRelit, numberFor, resultOf, sequenceOf, windowOf } from "./looks.js";
+import { isRelit, numberFor, resultOf, sequenceOf, sparedShare, windowOf } from "./looks.js";
 
 const COUNTS = { one: 1, two: 2, four: 4, wipe: 2 };
 const HANDLE_REACH = 0.46;
@@ -68,7 +68,7 @@ export function tellPanes(app, blocks) {
     const number = numberFor(app, sequence, app.loader.shown.at);
     const block = blocks[sequence.id];
     element.classList.toggle("active", Number(element.dataset.place) === app.state.active && app.paneElements.length > 1);
-    element.querySelector(".caption").textContent = number === null ? "" : captionOf(app, sequence, number, block);
+    element.querySelector(".caption").textContent = number === null ? "" : captionOf(app, sequence, number, block) + sparedOf(app, content, blocks);
     tellMessage(element.querySelector(".message"), messageOf(sequence, number, block));
     tellLegend(app, element.querySelector(".legend"), content, sequence);
     tellHandles(app, element, content);
@@ -83,6 +83,13 @@ function captionOf(app, sequence, number, block) {
     words.push(sequence.space === "camera" ? "" : `${sequence.space} space`, sequence.y === "down" ? "y down" : "");
   }
   return words.filter(Boolean).join(" · ");
+}
+
+// Say why a picture is not hatched of which next to nothing is trusted.
+function sparedOf(app, content, blocks) {
+  const share = sparedShare(app, content, blocks);
+  if (share === null) return "";
+  return ` · ${share ? `only ${(100 * share).toPrecision(1)} %` : "nothing"} is trusted, so nothing is hatched (V does)`;
 }
 
 function messageOf(sequence, number, block) {

@@ -2,6 +2,7 @@
 
 const GO = "M4 2.5v11L13 8z";
 const STOP = "M4 3h3v10H4zM9 3h3v10H9z";
+const PHOTOGRAPHS_RATE = 4; // slow enough to see each
 
 export function listenToTransport(app) {
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
@@ -27,10 +28,15 @@ function nearestNumber(numbers, wanted) {
   return numbers.reduce((best, number, at) => (Math.abs(number - wanted) < Math.abs(numbers[best] - wanted) ? at : best), 0);
 }
 
-// Results that are slower than any film, which is only so because pictures were left out of an exported page or because
-// they are of photographs: these have no time.
+// Results of no known rate, or slower than any film, which is only so because pictures were left out of an exported page
+// or because they are of photographs: these have no time.
 export function ofPhotographs(index) {
-  return !index.thinned && index.fps < 0.5;
+  return !index.fps || (!index.thinned && index.fps < 0.5);
+}
+
+// How many pictures a second are played.
+export function playedRate(index) {
+  return ofPhotographs(index) ? PHOTOGRAPHS_RATE : index.fps;
 }
 
 export function tellTransport(app) {
@@ -41,7 +47,7 @@ export function tellTransport(app) {
   const number = document.getElementById("number");
   if (document.activeElement !== number) number.value = master.numbers[state.at];
   const still = ofPhotographs(app.index);
-  document.getElementById("clock").textContent = still ? "" : `${master.times_s[state.at].toFixed(3)} s`;
+  document.getElementById("clock").textContent = still ? counted(state.at, master.numbers.length) : `${master.times_s[state.at].toFixed(3)} s`;
   const play = document.getElementById("play");
   play.querySelector("path").setAttribute("d", state.playing ? STOP : GO);
   play.setAttribute("aria-label", state.playing ? "Stop" : "Play");
@@ -50,6 +56,10 @@ export function tellTransport(app) {
   const rate = state.playing ? `${shown} of ${planned.toFixed(1)} fps` : `${planned.toFixed(2)} fps`;
   document.getElementById("rate").textContent = still ? "" : rate;
   drawMarks(app);
+}
+
+function counted(at, pictures) {
+  return pictures === 1 ? "1 picture" : `${at + 1} of ${pictures} pictures`;
 }
 
 // Over the slider: what is held and can be shown at once, dropped numbers, and pictures that could not be read.

@@ -58,8 +58,8 @@ def rig(
         yield Judgement(
             subject="rig",
             grade="unknown",
-            found="Whether rig and curve are right is not known: the pictures are not aligned, which looks the same. "
-            "See the line on motion.",
+            found="Whether rig and curve are right is not known: the lights' pictures are not aligned (subject or "
+            "camera moved from one to the next), and that looks the same as a wrong rig. See the line on motion.",
         )
         return
     yield from doubted

@@ -11,7 +11,7 @@ from psvideo.calibrate.still_pairs import Pairs
 from psvideo.clip import Clip
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.clip_layout import PLAN_FILE
+from psvideo.formats.clip_layout import PLAN_FILE, SETUP
 from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_folder import RIG_FILE
@@ -27,8 +27,6 @@ from psvideo.runs.photographs.still_rig import KnownLights, lens_stated
 from psvideo.solve.instants import Instant
 
 RIG, LP = RIG_FILE, "lights.lp"
-SETUP = "setup"
-"""The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
 SAME_FOCAL = 0.001
 """Focal lengths that differ by a smaller share are the same, rounded."""
 NO_DARK = (
