@@ -316,6 +316,7 @@ DAMAGED = {
     "tiff": write_tiff(),
     "tiff-zip": write_tiff(compression="zlib"),
     "tiff-strips": write_tiff(rowsperstrip=3),
+    "tiff-directory_at_end": lambda path, codes: path.write_bytes(cv2.imencode(".tif", codes)[1].tobytes()),
     "exr": lambda path, codes: write_exr(path, codes.astype(np.float32)),
     "dpx": write_dpx(16),
     "jpeg": write_jpeg,

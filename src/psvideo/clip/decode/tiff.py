@@ -102,6 +102,8 @@ def _only_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:
     """Return the page that holds the picture; reduced copies of it (thumbnails) do not count."""
     found = list(islice(file.pages, MOST_PAGES))  # a damaged page may name itself as the one that follows
     pages = [page.aspage() for page in found if not page.aspage().is_reduced]
+    if not found:  # many programs write what a file holds at its end
+        raise PsvideoError(f"{path}: ends before it says what it holds: it is truncated. Copy it again.")
     if len(pages) != 1 or len(found) == MOST_PAGES:
         raise PsvideoError(f"{path}: holds {len(pages)} pictures; expected one per file. Export one file per frame.")
     return pages[0]
