@@ -293,3 +293,16 @@ def test_other_names_are_written_as_they_are(names: tuple[str, ...], tmp_path: P
     rig = Rig(tuple(Light(name=one, direction=at) for one, at in zip(names, directions, strict=True)))
     write_rig(tmp_path / "a.lp", rig)
     assert read_rig(tmp_path / "a.lp").lights == rig.lights
+
+
+def test_another_number_of_names_than_a_list_has_lights_is_refused_without_a_word_of_a_plan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "three.txt").write_text("3\n0 0 1\n0.6 0 0.8\n0 0.6 0.8\n")
+    words = ["calibrate", "convert", str(tmp_path / "three.txt"), "-o", str(tmp_path / "rig.toml")]
+    assert main([*words, "--name", "key", "--name", "left"]) == 2
+    said = capsys.readouterr().err
+    assert "--name: " in said
+    assert "lists 3 lights, and is given 2 names (key, left)" in said.replace("\n", " ")
+    assert "plan" not in said
+    assert not (tmp_path / "rig.toml").exists()

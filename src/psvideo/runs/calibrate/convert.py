@@ -9,6 +9,7 @@ from psvideo.formats.light_lists.light_list_writer import files_of, write_rig
 from psvideo.formats.rig_toml import SCHEMA, read_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.model.rig import Rig
+from psvideo.model.units import counted
 from psvideo.runs.steps.caller import PYTHON, Caller
 
 
@@ -42,7 +43,19 @@ def convert(
         refuse_existing(file, force=force, mark=SCHEMA if file.suffix == ".toml" else None)
     if name and Path(rig).suffix == ".toml":
         raise UsageError(f"`name`: {rig} names its lights itself. Leave it out, or change the names in that file.")
+    if name:
+        _check_names(Path(rig), name)
     found = read_rig(Path(rig), plan_lights=tuple(name))
     for sentence in write_rig(path, found):
         caller.warn(sentence)
     return ConvertedRig(rig=found, files=files)
+
+
+def _check_names(path: Path, names: Sequence[str]) -> None:
+    """Raise UsageError where a list of lights is given another number of names, and writes none of these itself."""
+    listed = [light.name for light in read_rig(path).lights]
+    if len(listed) != len(names) and not set(listed) & set(names):
+        raise UsageError(
+            f"`name`: {path} lists {counted(len(listed), 'light')}, and is given {counted(len(names), 'name')} "
+            f"({', '.join(names)}). Give one for each light, in the list's order."
+        )
