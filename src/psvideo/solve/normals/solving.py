@@ -180,6 +180,7 @@ class Solving:
                 plate_noise=noise,
                 spare=self.spare,
                 unsure=one.unsure,
+                moves=one.moves,
                 looks=looks,
             )
         residual = self.residual or len(one.plates) > 3  # three measurements leave none

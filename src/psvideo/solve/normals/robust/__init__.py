@@ -2,7 +2,7 @@
 ``weighing`` holds its settings, and ``solution`` what it solves and where that goes.
 
 ``first_look`` finds what is typical of a picture, from a sample of its rows, where what moves leaves it
-``sure_of_motion``. Then a block of pixels goes through
+``sure_of_motion``; what stands speaks for all where it fits better than what moves. Then a block of pixels goes through
 ``robust_kernel``:
 
 1. ``explained``: plain least squares; pixels that it explains to their noise are done

@@ -47,6 +47,7 @@ def solve(
     plate_noise: PlateNoise | None = None,
     spare: Path | None = None,
     unsure: Floats | None = None,
+    moves: Mask | None = None,
     looks: Looks | None = None,
     threads: int | None = None,
 ) -> Surface:
@@ -55,8 +56,9 @@ def solve(
     Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error as well. ``misfit`` is
     what is typical of the picture; left out, it is found first, from a sample of the picture's rows. ``subject`` is
     what rounds of a take share; left out, it is found from these plates alone, where they are not ``unsure`` for motion
-    (light, row, col of a grid of its own). Where ``plate_noise`` is known, what
-    plain least squares explains to the noise is left to it: nothing is better there.
+    (light, row, col of a grid of its own). What ``moves`` (row, col of that grid) is not typical where what stands
+    fits better. Where ``plate_noise`` is known, what plain least squares explains to the noise is left to it: nothing
+    is better there.
 
     Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
     highlight is left out; three are taken as they are, and nothing shows whether one of them is a highlight.
@@ -75,7 +77,7 @@ def solve(
         half=half, residual=residual, spare=spare, threads=threads,
     )  # fmt: skip
     if misfit is None:
-        found, misfit, step = first_look(solution, lit, reweighting, noise, unsure)
+        found, misfit, step = first_look(solution, lit, reweighting, noise, unsure, moves)
         if misfit is not None and subject is None:
             points = points_of(
                 plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale, unsure=unsure

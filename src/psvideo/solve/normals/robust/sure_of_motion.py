@@ -30,3 +30,10 @@ def sure_of_motion(unsure: Floats, found: Surface, rows: NDArray[np.intp], lit: 
     cols = np.arange(albedo.shape[1])
     here = most[(rows * high // len(found.valid))[:, None], cols * wide // len(cols)]
     return np.asarray(here <= np.float32(MOST_UNSURE) * albedo)
+
+
+def standing_rows(moves: Mask, found: Surface, rows: NDArray[np.intp]) -> Mask:
+    """Return of some rows what does not move, by ``moves`` (row, col) on a grid of its own."""
+    high, wide = moves.shape
+    cols = np.arange(found.valid.shape[1])
+    return np.asarray(~moves[(rows * high // len(found.valid))[:, None], cols * wide // len(cols)])
