@@ -65,6 +65,14 @@ def test_rounds_at_the_ends_of_a_take_below_360_degrees_do_not_make_the_others_u
     assert ("In 5 of 61 rounds" in line.found) == (lost == 5)
 
 
+def test_the_worst_round_is_not_called_what_rounds_are_about() -> None:
+    """A pause of 0.5 ms hides no whole flash of 5 ms: what rows lack is not the shutter's mean, but one round's own."""
+    facts = KeptFacts([facts_of(number=n, unseen_share=0.0, borrowed_share=0.3 if n == 3 else 0.0) for n in range(9)])
+    plan, one = plan_of(["a"], mode="rolling", dark_s=0.01), Observed(lights=("a",), facts=facts)
+    (line,) = of_rows.coverage(plan, timing_of(exposure_s=0.0095), one)
+    assert "degrees only: up to 30 % of a round's rows come from other rounds" in line.found
+
+
 def test_check_and_the_whole_run_say_the_same_of_rows_that_come_from_other_rounds() -> None:
     """The worst round of a part was 93 %, of the whole 51 %, and the shutter hides 45 %."""
     plan = plan_of(["a"], mode="rolling", dark_s=0.01)

@@ -156,11 +156,11 @@ def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
         )
     elif borrowed > MOST_UNSEEN and serves:
         share = blind_share(_as_found(plan, timing), clock_offset_ppm=timing.clock_offset_ppm)
-        share = share if share > MOST_UNSEEN else borrowed
+        shares = f"about {100 * share:.0f}" if share > MOST_UNSEEN else f"up to {100 * borrowed:.0f}"  # mean, or worst
         yield Judgement(
             subject="rows",
             grade="doubtful",
-            found=f"{opened.capitalize()}: about {100 * share:.0f} % of a round's rows come from other rounds. What "
+            found=f"{opened.capitalize()}: {shares} % of a round's rows come from other rounds. What "
             f"stands still loses nothing by it, what moves in them is left out.{_lacking(rows)}",
             advice="Shoot at 360 degrees" + (", or film longer." if _too_short(rows) else "."),
         )
