@@ -35,11 +35,12 @@ class Doubt:
 
     @classmethod
     def of(cls, signs: Signs, how: Doubting) -> "Doubt":
-        """Return what signs come to."""
+        """Return what signs come to. Noise that grew since lights were left aside is in the doubt, and no misfit of a
+        pixel's own."""
         nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
         return cls(
             doubt_deg=doubt_deg(signs, how=how),
-            usual_deg=np.float32(how.own) * nearly,
+            usual_deg=np.float32(how.own) * np.hypot(nearly, signs.lost_deg),
             lost_deg=signs.lost_deg,
             by_slope_deg=np.broadcast_to(np.float32(signs.by_slope_deg), nearly.shape),
             shadows_lit=signs.shadows_lit,
