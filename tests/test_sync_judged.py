@@ -21,7 +21,7 @@ from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse import retime
 from psvideo.sync.rowfit.coarse import seed as seed_module
-from psvideo.sync.rowfit.coarse.search import losses, turned_clocks
+from psvideo.sync.rowfit.coarse.search import losses, search, turned_clocks
 from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.normal_equations import solved
@@ -765,6 +765,63 @@ def test_losses_of_square_pulses_are_those_of_any_pulses(lights: int, shutter: f
     sharp = losses(plan, rows, clocks, beat, place=rows.place)
     general = losses(plan, replace(rows, restless=np.full(9, 1e-300)), clocks, beat, place=rows.place)
     assert sharp == pytest.approx(general, rel=1e-9)
+
+
+def test_losses_of_rows_that_open_together_are_those_of_each_row_alone_to_the_bit(make_plan: PlanMaker) -> None:
+    """Such rows are scored side by side, and others one by one: a place that no number holds beside a time is none."""
+    plan, rows = two_windows(make_plan)
+    clocks = turned_clocks(np.linspace(0.0, plan.cycle_s, 40), np.array([-9000.0, 0.0, 9000.0]), 0.1)
+    together = losses(plan, rows, clocks, first_guess(plan), place=np.zeros(8))
+    assert np.array_equal(together, losses(plan, rows, clocks, first_guess(plan), place=np.full(8, 1e-300)))
+
+
+def test_the_place_found_where_the_readout_is_unknown_is_the_least_of_all_sums_over_rows(make_plan: PlanMaker) -> None:
+    plan, rows = two_windows(make_plan)
+    unknown = replace(plan, camera=replace(plan.camera, readout_s=None))
+    guess = first_guess(unknown)
+    places = search(unknown, rows, range_ppm=1000.0, start=guess, readout_known=False, keep=4)
+    phases = int(np.ceil(plan.cycle_s / (plan.shortest_flash_s / 3)))
+    step_s = plan.cycle_s / phases
+    count = int(np.ceil(rows.period_s / step_s))
+    middle_s = float(rows.frame_start_s.mean())
+    span_s = float(np.ptp(rows.frame_start_s)) + rows.period_s
+    slips = int(np.ceil(1000e-6 * span_s / (0.5 * plan.shortest_flash_s)))
+    ratios = np.linspace(-1.0, 1.0, 2 * slips + 1) * 1000.0
+    clocks = turned_clocks(np.arange(phases, dtype=np.float64) * step_s, ratios, middle_s)
+    loss = losses(plan, rows, clocks, guess, place=np.zeros(8)).reshape(len(ratios), phases, 8) / len(rows.value)
+    sums = np.empty((2 * count + 1, len(ratios), phases))
+    for n, readout_s in enumerate(np.arange(-count, count + 1) * rows.period_s / count):
+        place = rows.place if readout_s >= 0 else ROWS - 1 - rows.place
+        later = place / ROWS * abs(readout_s) / step_s
+        at = np.arange(phases) - later[:, None]  # where a row is scored that opens later
+        low, part = np.floor(at).astype(int) % phases, at - np.floor(at)
+        sums[n] = sum(
+            (1 - part[r]) * loss[:, low[r], r] + part[r] * loss[:, (low[r] + 1) % phases, r] for r in range(8)
+        )
+    sums /= 8
+    assert places[0].loss == pytest.approx(sums.min(), rel=1e-12)
+    assert [one.loss for one in places] == sorted(one.loss for one in places)
+    r, a, b = np.unravel_index(sums.argmin(), sums.shape)
+    clock = places[0].beat.clock
+    assert clock == clocks.at(int(a) * phases + int(b))
+    assert places[0].beat.upward == (r < count)
+    assert places[0].beat.row_time_s == pytest.approx(abs(int(r) - count) / count * rows.period_s / ROWS)
+    taken = np.array([one.beat.clock.phase_s for one in places[1:]]) - clock.phase_s
+    assert np.abs((taken + 0.5 * plan.cycle_s) % plan.cycle_s - 0.5 * plan.cycle_s).min() > 2.5 * step_s
+
+
+def two_windows(make_plan: PlanMaker) -> tuple[Plan, Profiles]:
+    """Return a plan of three lights of which rows see two at once, and 30 frames of it in two windows and 8 rows."""
+    film = make_plan(height_px=ROWS, width_px=COLUMNS)
+    plan = replace(film, dark_s=0.6 * film.dark_s)
+    rows = Profiles(
+        value=filmed(plan, frames=30),
+        index=np.arange(30),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(float(ROWS)),
+        window_start=np.array([0, 13], np.int64),
+    )
+    return plan, rows.binned(8)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -130,6 +130,20 @@ def _halve_one(clip: Path) -> None:
     some.plates[0].picture.halved()
 
 
+def _search_any_readout(clip: Path) -> None:
+    """Look for the strobe under every readout, as runs do where a plan's camera seems to be another."""
+    from psvideo.sync.find import as_profiles
+    from psvideo.sync.open_take import open_take
+    from psvideo.sync.rowfit.coarse.search import search
+    from psvideo.sync.rowfit.coarse.seed import SEARCH_ROWS, first_guess
+    from psvideo.sync.take_timing import take_profiles
+
+    take = open_take(clip)
+    seen = take_profiles(take)
+    rows = as_profiles(take.plan, seen.index, seen.value, seen.doubt).one_window().binned(SEARCH_ROWS)
+    search(take.plan, rows, range_ppm=0.0, start=first_guess(take.plan), readout_known=False)
+
+
 def _as_floats(frames: Path) -> None:
     """Write half-float frames again as 32-bit floats, as renderers do: pictures that no code of 16 bits holds."""
     from psvideo.clip.decode.exr import read_halves
@@ -149,6 +163,7 @@ def run_small(take: SmallTake) -> None:
         clip = filmed(take, Path(folder))
         normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
         _halve_one(clip)
+        _search_any_readout(clip)
         if take.live:
             live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
 

@@ -5,6 +5,7 @@ readout's loss is a sum over rows, each read at the phase at which that readout 
 search.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Doubles
+from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import row_model
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.coarse.readout_kernel import least_over_readouts, losses_together
 from psvideo.sync.rowfit.coarse.search_kernel import losses_by_row
 from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
 
@@ -26,6 +28,8 @@ FEWER, LEAST_ROWS = 4, 6
 """One of this many rows is looked at first, but no fewer rows than these;"""
 LOW = 0.15
 """the others only for this share of the clocks, the lowest."""
+PHASES_EACH = 1024
+"""Phases whose sums over readouts one thread takes at a time."""
 
 
 class TriedClocks(NamedTuple):
@@ -68,8 +72,10 @@ def search(
     clocks = turned_clocks(phases_s, ppm, float(rows.frame_start_s.mean()))
     if readout_known:
         loss = _least(plan, rows, clocks, start).reshape(len(ppm), len(phases_s)) / len(rows.value)
-        best = _best(loss[None], keep)
-        return [GridPlace(beat=_placed(start, clocks.at(a * len(phases_s) + b)), loss=value) for _, a, b, value in best]
+        ratio, phase = loss.argmin(axis=0), np.arange(len(phases_s))
+        best = _lowest(loss.min(axis=0), np.zeros_like(phase), ratio, keep)
+        at = ratio * len(phases_s) + phase
+        return [GridPlace(beat=_placed(start, clocks.at(int(at[b]))), loss=value) for b, value in best]
     loss = losses(plan, rows, clocks, start, place=np.zeros_like(rows.place))
     loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
     return _over_readouts(rows, loss, clocks, phases_s, start, keep)
@@ -126,8 +132,10 @@ def losses(plan: Plan, rows: Profiles, clocks: TriedClocks, start: Beat, *, plac
     phase_s, rate = clocks.phase_s, 1.0 + clocks.offset_ppm * 1e-6
     found = np.empty((len(phase_s), rows.value.shape[1]))
     spread = rows.spread
+    plain = start.rise_s == start.fall_s == 0.0 and not start.beat_hz and rows.restless is None
+    run = losses_together if plain and not place.any() else losses_by_row
     over_ranges(
-        lambda a, b: losses_by_row(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
+        lambda a, b: run(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
         len(phase_s),
         each=rows_of_a_part(rows.value.size),
     )
@@ -147,24 +155,24 @@ def _over_readouts(
     step_s = phases_s[1] - phases_s[0]
     count = int(np.ceil(rows.period_s / step_s))
     readouts_s = np.arange(-count, count + 1) * rows.period_s / count
-    total = np.empty((len(readouts_s), *loss.shape[:2]))
-    phases = len(phases_s)
-    by_row = np.concatenate([np.moveaxis(loss, 2, 0)] * 2, axis=2)  # twice around the cycle: a place in it is a slice
-    for r, readout_s in enumerate(readouts_s):
-        place = rows.place if readout_s >= 0 else height - 1 - rows.place
-        total[r] = 0.0
-        for row, offset_s in enumerate(place / height * abs(readout_s)):
-            below, part = divmod(offset_s / step_s, 1.0)
-            low = phases - int(below) % phases
-            here, before = by_row[row, :, low : low + phases], by_row[row, :, low - 1 : low - 1 + phases]
-            total[r] += (1 - part) * here + part * before
+    places = np.where(readouts_s[:, None] >= 0, rows.place, height - 1 - rows.place)
+    below, part = np.divmod(places / height * np.abs(readouts_s)[:, None] / step_s, 1.0)
+    # twice around the cycle: a place in it is a slice
+    by_row = np.concatenate([np.moveaxis(loss, 2, 0)] * 2, axis=2)
+    least, readout, ratio = np.empty(len(phases_s)), *np.zeros((2, len(phases_s)), np.int64)
+    over_ranges(
+        lambda a, b: least_over_readouts(by_row, below.astype(np.int64), part, a, b, least, readout, ratio),
+        len(phases_s),
+        each=PHASES_EACH,
+    )
     found = []
-    for r, a, b, value in _best(total / loss.shape[2], keep):
+    for b, value in _lowest(least, readout, ratio, keep):
+        readout_s = float(readouts_s[readout[b]])
         beat = Beat(
-            clock=clocks.at(a * len(phases_s) + b),
-            row_time_s=abs(float(readouts_s[r])) / height,
+            clock=clocks.at(int(ratio[b]) * len(phases_s) + b),
+            row_time_s=abs(readout_s) / height,
             exposure_s=start.exposure_s,
-            upward=bool(readouts_s[r] < 0),
+            upward=readout_s < 0,
             rise_s=start.rise_s,
             fall_s=start.fall_s,
             beat_hz=start.beat_hz,
@@ -173,18 +181,17 @@ def _over_readouts(
     return found
 
 
-def _best(loss: Doubles, keep: int) -> list[tuple[int, int, int, float]]:
-    """Return the lowest places of a cube, no two of them neighbours in phase."""
-    left = loss.copy()
-    found = []
-    for _ in range(keep):
-        at = np.unravel_index(int(np.argmin(left)), left.shape)
-        found.append((int(at[0]), int(at[1]), int(at[2]), float(left[at])))
-        near = (np.arange(at[2] - 2, at[2] + 3)) % left.shape[2]
-        left[:, :, near] = np.inf
-        if not np.isfinite(left).any():
+def _lowest(least: Doubles, readout: Integers, ratio: Integers, keep: int) -> Iterator[tuple[int, float]]:
+    """Yield the phases with the lowest losses ``least`` (phase,), and these, no two of them neighbours; of equal ones
+    first that of the first ``readout`` (phase,) and ``ratio`` (phase,) on the grid."""
+    near = np.zeros(len(least), np.bool_)
+    for b in np.lexsort((ratio, readout, least)).tolist():
+        if keep == 0 or (near.any() and not np.isfinite(least[b])):
             break
-    return found
+        if not near[b]:
+            yield b, float(least[b])
+            near[np.arange(b - 2, b + 3) % len(least)] = True
+            keep -= 1
 
 
 def _placed(start: Beat, clock: FoundClock) -> Beat:

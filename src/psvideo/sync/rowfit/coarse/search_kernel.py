@@ -43,7 +43,7 @@ def losses_by_row(
     """Fill ``found`` (clock, row) with the robust loss of every clock in every row: the sum over frames of
     ``log(1 + steepness * (rest / spread)^2)``."""
     frames, height = rows.value.shape
-    size, most = width(rows, flashes), _most_seen(rows, flashes)
+    size, most = width(rows, flashes), most_seen(rows, flashes)
     seen = ListedFlashes(np.empty(frames, np.int64), np.empty((frames, most), np.int64), np.empty((frames, most)))
     normal, right = np.empty((size, size)), np.empty(size)
     design, rest, value = np.empty((frames, size)), np.empty(frames), np.empty(frames)
@@ -63,7 +63,8 @@ def losses_by_row(
         for row in range(height):
             total, steep = 0.0, steepness / spread[row] ** 2
             if square and rows.restless[row] == 0.0:
-                _see(rows, row, moved, seen, value)
+                value[:] = rows.value[:, row]
+                list_seen(rows, row, moved, seen)
                 for window in range(len(rows.bounds) - 1):
                     begin, end = rows.bounds[window], rows.bounds[window + 1]
                     _fit(value, seen, begin, end, normal, right)
@@ -76,7 +77,7 @@ def losses_by_row(
 
 
 @EXACT.inlined
-def _most_seen(rows: Rows, flashes: Flashes) -> int:
+def most_seen(rows: Rows, flashes: Flashes) -> int:
     """Return how many flashes a row may see in a frame at most."""
     closest_s, longest_s = np.inf, flashes.duration_s[0]
     for j in range(1, len(flashes.start_s)):
@@ -86,14 +87,13 @@ def _most_seen(rows: Rows, flashes: Flashes) -> int:
 
 
 @EXACT.inlined
-def _see(rows: Rows, row: int, flashes: Flashes, seen: ListedFlashes, value: Doubles) -> None:
-    """List what a row saw of lit flashes in every frame, and fill in its ``value`` (frame,)."""
+def list_seen(rows: Rows, row: int, flashes: Flashes, seen: ListedFlashes) -> None:
+    """List what a row saw of lit flashes in every frame."""
     start_s, duration_s, unknown = flashes.start_s, flashes.duration_s, flashes.unknown
     offset_s = rows.row_place[row] * rows.row_time_s
     count = len(start_s)
     k = 0
-    for n in range(len(value)):
-        value[n] = rows.value[n, row]
+    for n in range(len(seen.many)):
         open_s = rows.frame_start_s[n] + offset_s
         close_s = open_s + rows.exposure_s
         while k < count and start_s[k] + duration_s[k] <= open_s:
