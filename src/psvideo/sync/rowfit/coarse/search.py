@@ -158,7 +158,7 @@ def _over_readouts(
     places = np.where(readouts_s[:, None] >= 0, rows.place, height - 1 - rows.place)
     below, part = np.divmod(places / height * np.abs(readouts_s)[:, None] / step_s, 1.0)
     # twice around the cycle: a place in it is a slice
-    by_row = np.concatenate([np.moveaxis(loss, 2, 0)] * 2, axis=2)
+    by_row = np.ascontiguousarray(np.concatenate([np.moveaxis(loss, 2, 0)] * 2, axis=2))  # else compiled once more
     least, readout, ratio = np.empty(len(phases_s)), *np.zeros((2, len(phases_s)), np.int64)
     over_ranges(
         lambda a, b: least_over_readouts(by_row, below.astype(np.int64), part, a, b, least, readout, ratio),
