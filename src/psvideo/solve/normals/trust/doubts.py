@@ -35,8 +35,8 @@ class Doubt:
 
     @classmethod
     def of(cls, signs: Signs, how: Doubting) -> "Doubt":
-        """Return what signs come to. Noise that grew since lights were left aside is in the doubt, and no misfit of a
-        pixel's own."""
+        """Return what signs come to. Noise that grows where lights are left aside is part of the doubt, so it does not
+        count as a pixel's own misfit as well."""
         nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
         return cls(
             doubt_deg=doubt_deg(signs, how=how),
