@@ -96,6 +96,43 @@ def test_a_sheen_that_the_whole_subject_has_turns_no_normal(monkeypatch: pytest.
     assert off.mean() < 0.4
 
 
+FIVE = np.concatenate([ring(4, 45), ring(1, 10)])
+OTHER_FIVE = np.concatenate([ring(3, 50), ring(2, 25)])
+
+
+@pytest.mark.parametrize("ways", [FIVE, OTHER_FIVE], ids=["ring", "uneven"])
+@pytest.mark.parametrize("gloss", [0.05, 0.15, 0.4])
+def test_a_sheen_that_is_plain_under_five_lights_turns_no_normal(
+    monkeypatch: pytest.MonkeyPatch, ways: Array, gloss: float
+) -> None:
+    normals, sent = waves(), np.broadcast_to(ways[:, None, None], (len(ways), SIZE, SIZE, 3))
+    plates = shot(normals, sent, gloss=gloss)
+    found = Solving(error=True).solve(plates, under(ways))
+    off = off_deg(found.normals, normals)
+    assert found.error_deg is not None
+    assert (off <= 2 * found.error_deg).mean() > 0.9
+    without_model(monkeypatch)
+    before = Solving(error=True).solve(plates, under(ways))
+    assert off.mean() < 0.6 * off_deg(before.normals, normals).mean()
+    assert found.valid.mean() >= before.valid.mean()
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("wrong_deg", [1, 2])
+def test_five_lights_that_stand_elsewhere_than_the_rig_says_pass_for_no_sheen_and_no_clay(
+    monkeypatch: pytest.MonkeyPatch, wrong_deg: float, seed: int
+) -> None:
+    normals, sent = waves(), np.broadcast_to(FIVE[:, None, None], (len(FIVE), SIZE, SIZE, 3))
+    plates, across = shot(normals, sent, gloss=0.0), np.random.default_rng(seed).normal(size=FIVE.shape)
+    across -= (across * FIVE).sum(axis=1, keepdims=True) * FIVE
+    claimed = FIVE + np.tan(np.radians(wrong_deg)) * across / np.linalg.norm(across, axis=1, keepdims=True)
+    claimed /= np.linalg.norm(claimed, axis=1, keepdims=True)
+    off = off_deg(Solving().solve(plates, under(claimed)).normals, normals)
+    without_model(monkeypatch)
+    before = off_deg(Solving().solve(plates, under(claimed)).normals, normals)
+    assert off.mean() <= 1.02 * before.mean()
+
+
 def test_the_matte_part_of_a_subject_stays_matte(monkeypatch: pytest.MonkeyPatch) -> None:
     lit, sent = distant()
     normals = waves()
