@@ -20,7 +20,7 @@ from psvideo.calibrate.stripes.waveform import fit_stripes
 from psvideo.capture import cameras
 from psvideo.cli.app import main
 from psvideo.clip.decoded import CodedPicture, Header
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.arrays import Doubles
 
 LED_HZ = 1013.0
@@ -196,6 +196,8 @@ def test_crops_and_zoomed_views_count_rows_of_the_sensor() -> None:
     assert zoomed.readout_s == pytest.approx(whole.readout_s)
     assert zoomed.rows == ROWS // 2
     assert measured(frame, zoom=0.5, rows=2 * ROWS).readout_s == pytest.approx(whole.readout_s)
+    with pytest.raises(UsageError, match=f"`rows` {ROWS - 1}: .* shows {ROWS} rows of the sensor already"):
+        measured(frame, rows=ROWS - 1)
 
 
 def test_the_led_s_clock_has_its_part_in_the_error() -> None:

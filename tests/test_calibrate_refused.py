@@ -1,5 +1,6 @@
 """Numbers of a calibration that cannot be meant, and what beside a calibration is not believed or is repeated."""
 
+import json
 import re
 from collections.abc import Callable
 from functools import partial
@@ -104,6 +105,69 @@ def test_rig_and_falloff_are_never_written_to_one_file(
     words = ["calibrate", "flat-field", str(shot[0]), "--rig", str(shot[1]), "-o", out, "--flat", out]
     assert main(words) == 2
     assert "--out and --flat both name" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["flat-field", "colours", "intensities"])
+def test_a_rig_that_is_not_there_is_said_before_pictures_are_read(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a clip the flashes are sought first, which takes minutes."""
+    words = ["calibrate", command, str(tmp_path / "none"), "--rig", str(tmp_path / "no.toml")]
+    assert main([*words, "-o", str(tmp_path / "rig.toml")]) == 1
+    assert "no.toml: there is no such file" in capsys.readouterr().err
+
+
+def test_a_first_light_of_pictures_that_are_no_flashes_is_refused(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = shot[0].with_name("rig.toml")
+    assert main(["calibrate", "matte-sphere", str(shot[0]), "-o", str(out), "--first-light", "a"]) == 2
+    assert "--first-light a: is for strobed clips" in capsys.readouterr().err
+
+
+def test_a_falloff_gets_a_name_under_which_it_is_known(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = shot[0].with_name("rig.toml")
+    words = ["calibrate", "flat-field", str(shot[0]), "--rig", str(shot[1]), "-o", str(out)]
+    assert main([*words, "--flat", str(out.with_name("flat.txt"))]) == 2
+    assert "expected a name that ends in .toml, such as" in capsys.readouterr().err
+
+
+def test_a_ball_of_next_to_no_pixels_is_refused_with_its_folder(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = shot[0].with_name("rig.toml")
+    assert main(["calibrate", "matte-sphere", str(shot[0]), "-o", str(out), "--circle", "95,72,4"]) == 1
+    assert re.search(rf"{re.escape(str(shot[0]))}: The sphere shows \d+ usable pixels", capsys.readouterr().err)
+
+
+def test_a_ball_on_which_no_light_shows_is_drawn_as_it_was_taken_to_be(
+    shot: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = shot[0].with_name("rig.toml")
+    assert main(["calibrate", "mirror-sphere", str(shot[0]), "-o", str(out), "--circle", "95.3,71.8,60"]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "no light could be measured" in said
+    assert "; and 1 more light)" in said
+    assert said.endswith(f"See {out.with_suffix('.png')}.")
+    assert out.with_suffix(".png").exists()
+    assert not out.exists()
+
+
+def test_colours_that_are_the_same_are_no_number_that_json_has_none_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    card = np.full((40, 40), 0.5, np.float32)
+    for name in "ab":
+        write_exr(tmp_path / "card" / f"{name}.exr", dict.fromkeys("RGB", card), half=False)
+    lights = tuple(Light(name=name, direction=at) for name, at in (("a", (0.6, 0.0, 0.8)), ("b", (-0.6, 0.0, 0.8))))
+    (tmp_path / "known.toml").write_text(format_rig(Rig(lights=lights)))
+    words = ["calibrate", "colours", str(tmp_path / "card"), "--rig", str(tmp_path / "known.toml")]
+    assert main([*words, "-o", str(tmp_path / "rig.toml"), "--json"]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out, parse_constant=pytest.fail)["condition"] is None
+    assert "the colours of a and b are the same, and" in told.err
 
 
 def test_pictures_that_a_rig_knows_nothing_of_are_named_with_the_rig(

@@ -49,6 +49,7 @@ def test_the_readout_is_found_to_its_own_error_with_its_sign(share: float, make_
     assert found.rows_error_s < 1e-3 * abs(plan.camera.readout_s)
     assert found.direction == ("top-down" if share > 0 else "bottom-up")
     assert found.frame_share == pytest.approx(abs(share), abs=3 * found.frame_share_error)
+    assert not found.warnings, "what is measured is no reason to warn"
 
 
 @pytest.mark.campaign

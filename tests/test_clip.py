@@ -229,6 +229,8 @@ def test_pixels_that_are_no_numbers_are_refused(tmp_path: Path, write_plan: Call
 def test_a_frame_that_the_clip_lacks_is_a_wrong_choice(shot: Path) -> None:
     with pytest.raises(UsageError, match=r"has no frame number 10; its 4 frames are numbered 8 to 12"):
         read_frames(open_clip(shot), [9, 10])
+    with pytest.raises(UsageError, match=r"names none of the clip's frames; its only frame has the number 8\."):
+        parse_range("9-10", [8])
 
 
 def decoding_threads() -> list[str]:

@@ -110,6 +110,15 @@ def test_what_the_first_item_waits_for_is_not_expected_of_the_others(
     ]
 
 
+def test_of_what_takes_long_is_said_how_long_each_takes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 50.0, 100.0, 150.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    list(Voice().track(range(3), total=10, what="compiling", unit="takes"))
+    assert capsys.readouterr().err.splitlines()[-1] == "compiling: 3 of 10 takes, 50 s each, 350 s left"
+
+
 def test_quiet_says_nothing_and_machines_get_no_text_on_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     quiet, machines = Voice(quiet=True), Voice(json=True)
     quiet.say("a")

@@ -300,6 +300,14 @@ def test_an_output_below_a_file_is_refused_before_any_work(tmp_path: Path) -> No
             refuse_existing(out, force=True)
 
 
+def test_an_output_that_cannot_be_written_is_refused_before_any_work(tmp_path: Path) -> None:
+    """A name that is too long cannot be written by any account, as a folder that is only read cannot by most."""
+    with pytest.raises(PsvideoError, match="cannot be written"):
+        refuse_existing(tmp_path / f"{'long' * 60}.toml", force=True)
+    refuse_existing(tmp_path / "new" / "rig.toml", force=False)
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("in the way")

@@ -1,5 +1,6 @@
 """Mistakes that new users make: each is answered in one paragraph that says what to do, and nothing is lost."""
 
+import shutil
 from pathlib import Path
 
 import cv2
@@ -29,12 +30,35 @@ def reported(capsys: pytest.CaptureFixture[str], *words: object, status: int) ->
     return " ".join(said.split())
 
 
-@pytest.mark.parametrize("words", [["sync", "{clip}", "--plan", "{clip}"], ["strobe", "check", "{clip}"]])
-def test_a_folder_where_a_file_is_meant_names_the_files_in_it(
-    words: list[str], clip: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["sync", "{clip}", "--plan", "{clip}"], "plan.toml"),
+        (["strobe", "check", "{clip}"], "plan.toml"),
+        (["calibrate", "convert", "{clip}", "-o", "{other}/lights.lp"], "rig.toml"),
+        (["calibrate", "flat-field", "{clip}", "--rig", "{clip}", "-o", "{other}/rig.toml"], "rig.toml"),
+    ],
+)
+def test_a_folder_where_a_file_is_meant_names_the_files_of_that_kind_in_it(
+    words: list[str], meant: str, clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = reported(capsys, *(word.format(clip=clip) for word in words), status=1)
-    assert f"{clip}: is a folder, and a file is expected. Name the file in it: {clip / 'plan.toml'} or" in said
+    said = reported(capsys, *(word.format(clip=clip, other=tmp_path) for word in words), status=1)
+    assert said.endswith(f"{clip}: is a folder, and a file is expected. Name the file in it: {clip / meant}.")
+
+
+@pytest.mark.parametrize("command", ["sync", "normals", "info"])
+def test_a_frame_that_is_a_link_to_nothing_is_named_with_what_it_should_lead_to(
+    command: str, clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(clip, tmp_path / "clip", ignore=shutil.ignore_patterns("truth"))
+    frame = tmp_path / "clip" / "frames" / "sphere.0006.png"
+    frame.unlink()
+    frame.symlink_to(tmp_path / "disk" / "a.png")
+    out = [] if command == "info" else ["-o", tmp_path / "out.json"]
+    assert main([command, str(tmp_path / "clip"), *map(str, out)]) == 1
+    told = capsys.readouterr()
+    said = " ".join((told.out if command == "info" else told.err).split())
+    assert f"{frame}: is a link to {tmp_path / 'disk' / 'a.png'}, which is not there. Put the file itself" in said
 
 
 @pytest.mark.parametrize(

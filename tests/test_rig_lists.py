@@ -306,3 +306,19 @@ def test_another_number_of_names_than_a_list_has_lights_is_refused_without_a_wor
     assert "lists 3 lights, and is given 2 names (key, left)" in said.replace("\n", " ")
     assert "plan" not in said
     assert not (tmp_path / "rig.toml").exists()
+
+
+def test_names_that_a_list_writes_itself_are_not_given_to_other_lights(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Lights that a list names are known by these names, so that others in their place would go unheard."""
+    lists, out = tmp_path / "two.lp", tmp_path / "rig.toml"
+    lists.write_text("2\nkey.jpg 0 0 1\nleft.jpg 0.6 0 0.8\n")
+    words = ["calibrate", "convert", str(lists), "-o", str(out)]
+    for names in (("left", "key"), ("key", "top")):
+        assert main([*words, *(word for name in names for word in ("--name", name))]) == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert f"--name: {lists} names its lights itself (key, left), some of them as here." in said
+        assert not out.exists()
+    assert main([*words, "--name", "top", "--name", "right"]) == 0
+    assert read_rig(out).names == ("top", "right")

@@ -21,6 +21,7 @@ from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.rig import Light, Rig
+from psvideo.model.units import counted
 
 INNER_DEG = 72.0
 """Pixels count whose normal turns from the viewing ray by less: the rim mixes with what is behind it."""
@@ -65,8 +66,8 @@ def measure_matte_sphere(pictures: LightPictures, outline: Outline, *, albedo: f
     sphere = _pixels(pictures, outline.view, outline.place)
     if len(sphere.normals) < LEAST_PIXELS:
         raise PsvideoError(
-            f"The sphere shows {len(sphere.normals)} usable pixels; expected {LEAST_PIXELS} or more. Film it larger, "
-            "or check its outline (`circle` x,y,radius)."
+            f"The sphere shows {counted(len(sphere.normals), 'usable pixel')}; expected {LEAST_PIXELS} or more. Film "
+            "it larger, or check its outline (`circle` x,y,radius)."
         )
     moved = [_pixels(pictures, outline.view, place) for place in _outlines_off(outline)]
     found = _all_as_flat([_light(name, n, sphere, moved) for n, name in enumerate(pictures.names)])
@@ -187,8 +188,8 @@ def _covariances(sphere: MattePixels, n: int, moved: list[MattePixels], found: M
     """Return the covariance (3, 3) of a light's direction times its intensity: how it changes as patches are left out
     one by one and as only what is well lit counts; and as the outline is moved by its own error."""
     everything, total = np.ones(len(sphere.normals), np.bool_), found.total
-    counted = np.bincount(sphere.patch[found.lit], minlength=PATCHES**2)
-    patches = np.flatnonzero(counted >= FEWEST_OF_A_PATCH)
+    seen = np.bincount(sphere.patch[found.lit], minlength=PATCHES**2)
+    patches = np.flatnonzero(seen >= FEWEST_OF_A_PATCH)
     without = [matte_fit(sphere, n, sphere.patch != patch).total for patch in patches]
     well_lit = matte_fit(sphere, n, everything, least_cosine=STEEPER_COSINE).total
     off = [matte_fit(one, n, np.ones(len(one.normals), np.bool_)).total for one in moved]

@@ -16,6 +16,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.take_timing import find_timing
+from psvideo.sync.verdict.remarks import READOUT_FOUND
 
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""
@@ -77,7 +78,7 @@ def readout_of(plan: Plan, timing: Timing, *, frames: int, tolerance_ppm: float 
         frames=frames,
         flashes=len(timing.flashes),
         direction=("top-down" if readout_s > 0 else "bottom-up") if sure else "unknown",
-        warnings=timing.notes,
+        warnings=tuple(note for note in timing.notes if not note.startswith(READOUT_FOUND)),  # what is measured here
     )
 
 

@@ -89,9 +89,12 @@ class Voice:
         return Caller(say=self.say, warn=self.warn, detail=self.detail, spell=spelled, command=command)
 
 
+SLOWEST_RATE = 0.1
+"""Items a second below which the time that each takes is said."""
 KEPT = (
-    "psvideo: compiling, once: this run's loops for this processor, which takes a minute or two. They are kept for all "
-    "later runs; psvideo doctor --compile does it ahead."
+    "psvideo: compiling, once: those loops of this run that no run before it needed, for this processor, which takes "
+    "up to a minute or two. They are kept for all later runs; other commands and other kinds of footage may need more. "
+    "psvideo doctor --compile does it ahead for usual runs."
 )
 LOST = (
     "psvideo: compiling this run's loops for this processor, which takes a minute or two, and will again in every run: "
@@ -160,14 +163,14 @@ def _bar(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[It
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    rate = TextColumn("{task.fields[rate]} " + unit + "/s")
+    rate = TextColumn("{task.fields[rate]}")
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=total, rate="…")
         for item in items:
             yield item
             speed = progress.tasks[0].speed
-            progress.update(task, advance=1, rate=f"{speed:.1f}" if speed else "…")
+            progress.update(task, advance=1, rate=_rate(speed, unit) if speed else "…")
 
 
 def _lines(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:
@@ -190,4 +193,9 @@ def _pace(done: int, seconds: float, left: int, unit: str) -> str:
     if done < 1 or seconds <= 0:
         return ""
     rate = done / seconds
-    return f", {rate:.1f} {unit}/s, {left / rate:.0f} s left"
+    return f", {_rate(rate, unit)}, {left / rate:.0f} s left"
+
+
+def _rate(rate: float, unit: str) -> str:
+    """Return how fast items come; of slow ones how long each takes, since 0.0 a second says nothing."""
+    return f"{rate:.1f} {unit}/s" if rate >= SLOWEST_RATE else f"{1 / rate:.0f} s each"

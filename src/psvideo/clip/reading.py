@@ -89,6 +89,8 @@ def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
 
 
 def _span(numbers: tuple[int, ...]) -> str:
+    if len(numbers) == 1:
+        return f"its only frame has the number {numbers[0]}"
     return f"its {len(numbers)} frames are numbered {numbers[0]} to {numbers[-1]}"
 
 

@@ -4,6 +4,7 @@ A file that breaks its contract gets one paragraph that names file, key, what wa
 unknown key is answered with the nearest known one.
 """
 
+import contextlib
 import json
 import tomllib
 from pathlib import Path
@@ -38,23 +39,22 @@ def check_light_name(name: str) -> str:
 
 
 Model = TypeVar("Model", bound=Contract)
+SHOWS_KIND = 4096
+"""Letters of a file among which its schema stands: first, or behind a comment or two."""
 MOST_BYTES = 1 << 28
 """The longest text that is read: the timing of a take of hours has a quarter of it."""
 
 
 def read_toml(path: Path, model: type[Model], schema: str) -> Model:
     """Read a TOML file whose ``schema`` key is e.g. ``psvideo-plan/1``. Raises PsvideoError for every kind of fault."""
-    return parse_toml(read_text(path), model, schema, source=str(path))
+    return parse_toml(read_text(path, kind=schema), model, schema, source=str(path))
 
 
-def read_text(path: Path) -> str:
-    """Read a small text file; raises PsvideoError where it is missing or no text."""
+def read_text(path: Path, *, kind: str = "") -> str:
+    """Read a small text file; raises PsvideoError where it is missing or no text. ``kind`` is a word that files of the
+    wanted kind begin with: where a folder is named, the files in it that hold it are."""
     if path.is_dir():
-        inside = sorted(found.name for found in path.glob("*.toml"))
-        advice = (
-            f"Name the file in it: {' or '.join(str(path / name) for name in inside)}." if inside else "Name a file."
-        )
-        raise PsvideoError(f"{path}: is a folder, and a file is expected. {advice}")
+        raise PsvideoError(f"{path}: is a folder, and a file is expected. {_named_inside(path, kind)}")
     try:
         check_file(path)
         if path.stat().st_size > MOST_BYTES:
@@ -75,6 +75,19 @@ def read_text(path: Path) -> str:
         raise PsvideoError(f"{path}: is not text (byte {fault.start} is not UTF-8). Name another file.") from None
     except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault
+
+
+def _named_inside(folder: Path, kind: str) -> str:
+    """Return the advice to name one of a folder's text files: of the wanted kind where there is one, else of any."""
+    inside = sorted(found for found in folder.glob("*.toml") if found.is_file())
+    fit = [found for found in inside if kind and kind in _beginning(found)]
+    return f"Name the file in it: {' or '.join(map(str, fit or inside))}." if inside else "Name a file."
+
+
+def _beginning(path: Path) -> str:
+    with contextlib.suppress(OSError), path.open(encoding="utf-8-sig", errors="replace") as file:
+        return file.read(SHOWS_KIND)
+    return ""
 
 
 def read_json(path: Path, *, advice: str) -> dict[str, Any]:

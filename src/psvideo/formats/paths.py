@@ -43,6 +43,16 @@ def check_file(path: Path) -> None:
         raise PsvideoError(f"{path}: is {OTHER_THAN_FILES.get(kind, 'no file')}, and a file is expected. Name a file.")
 
 
+def not_there(path: Path) -> PsvideoError:
+    """Return what to raise where a file of a folder that was read is gone, or was a link to another that is."""
+    if path.is_symlink():
+        return PsvideoError(
+            f"{path}: is a link to {path.readlink()}, which is not there. Put the file itself in its place, or mount "
+            "the disk that it lies on."
+        )
+    return PsvideoError(f"{path}: is not there any more. Check its name, or put it back.")
+
+
 def take_name(clip: Path) -> str:
     """Return what a clip's results, and its rig, are called: its folder's name, or its movie's without the ending.
 

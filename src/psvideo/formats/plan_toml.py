@@ -156,7 +156,7 @@ def read_plan(path: Path | str) -> Plan:
     >>> plan.lights, plan.camera.height_px, plan.flashes[0].duration_s
     (('key', 'left', 'top'), 120, 0.001)
     """
-    return parse_plan(read_text(path_of("path", path)), source=str(path))
+    return parse_plan(read_text(path_of("path", path), kind=SCHEMA), source=str(path))
 
 
 def parse_plan(text: str, *, source: str = "plan") -> Plan:

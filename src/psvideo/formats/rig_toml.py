@@ -132,8 +132,8 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
     [0.488, 0.39, 0.781]
     """
     path = path_of("path", path)
-    if path.suffix == ".toml":
-        rig = _in_front(parse_rig(read_text(path), source=str(path)), path)
+    if path.suffix == ".toml" or path.is_dir():  # a folder is refused, and the rigs in it are named
+        rig = _in_front(parse_rig(read_text(path, kind=SCHEMA), source=str(path)), path)
         try:
             rig.select(plan_lights)
         except PsvideoError as fault:

@@ -85,7 +85,7 @@ def is_drawn(path: Path) -> bool:
 
 def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:
     """Raise UsageError where an output exists already and ``force`` does not allow to replace it, or would lie below a
-    file; what earlier runs that were killed left beside it is removed.
+    file, and PsvideoError where it could not be written; what earlier runs that were killed left beside it is removed.
 
     ``mark`` is a word that a file of this kind holds: what does not is not replaced, even with ``force``.
     """
@@ -93,15 +93,15 @@ def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None
     if above.is_file():
         raise UsageError(f"{path}: cannot be written, as {above} is a file. Name an output in a folder.")
     _remove_left(path)
-    if not path.exists():
-        return
-    if not force:
+    there = path.exists()
+    if there and not force:
         raise UsageError(f"{path}: exists already. Name another output, or give `force` to replace it.")
-    if mark is not None and not (path.is_file() and mark.encode() in _beginning(path)):
+    if there and mark is not None and not (path.is_file() and mark.encode() in _beginning(path)):
         raise UsageError(
             f"{path}: exists and is nothing that this command wrote (no {mark!r} in it), so it is not replaced, not "
             "even with `force`. Name another output."
         )
+    check_can_be_written(path)
 
 
 def check_ending(path: Path, *endings: str, name: str) -> None:

@@ -71,8 +71,9 @@ def _facts(clip: Clip) -> dict[str, Fact]:
 
 
 def _findings(clip: Clip) -> Iterator[Finding]:
-    span = f"numbered {clip.numbers[0]} to {clip.numbers[-1]}"
-    yield ok(f"{len(clip.numbers)} frames, {span}: {clip.kind}, {looks(clip.header)}")
+    first, last = clip.numbers[0], clip.numbers[-1]
+    span = f"number {first}" if first == last else f"numbered {first} to {last}"
+    yield ok(f"{counted(len(clip.numbers), 'frame')}, {span}: {clip.kind}, {looks(clip.header)}")
     yield from (warn(text) for text in clip.warnings)
     yield from (ok(text) for text in clip.notes)
     yield from _hole_findings(clip)

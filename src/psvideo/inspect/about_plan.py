@@ -46,7 +46,7 @@ def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:
     flashes = int(seconds / plan.cycle_s * per_cycle)
     rounds = int(seconds / plan.cycle_s * len(plan.dark_rounds))
     whole = counted(rounds, "whole round")
-    text = f"{seconds:.4g} s at {float(plan.camera.fps):.6g} fps: about {flashes} flashes, {whole}"
+    text = f"{seconds:.4g} s at {float(plan.camera.fps):.6g} fps: about {counted(flashes, 'flash')}, {whole}"
     if rounds < 1:
         return fault(f"{text}, which is too short: a round lasts {plan.cycle_s / len(plan.dark_rounds):.4g} s")
     return ok(text)

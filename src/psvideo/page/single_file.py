@@ -18,6 +18,7 @@ import numpy as np
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import check_ending, refuse_existing, whole_file
+from psvideo.model.units import counted
 from psvideo.page.assembled import assets
 from psvideo.page.picture import Look, missing_block, picture_block
 from psvideo.page.show import Show, ShownSequence, index_of
@@ -52,7 +53,8 @@ class PageContents:
         """The same for people."""
         missing = f", of which {self.missing} could not be read" if self.missing else ""
         size = f"{self.total_bytes / 1e6:.1f} MB"
-        return f"{self.pictures} pictures {self.width_px} pixels wide{missing}, {size}. It opens in any browser."
+        pictures = counted(self.pictures, "picture")
+        return f"{pictures} {self.width_px} pixels wide{missing}, {size}. It opens in any browser."
 
 
 def write_single_page(

@@ -12,7 +12,7 @@ from psvideo.formats.rig_folder import rig_beside
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import SCHEMA as TIMING
 from psvideo.formats.timing_json import format_timing
-from psvideo.formats.whole_files import check_can_be_written, refuse_existing, write_text
+from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.live.chain import Chain
 from psvideo.live.following.lock import check_followed
 from psvideo.live.incoming.source import LiveSource
@@ -138,7 +138,6 @@ def _free(path: Path | None, *, force: bool) -> Path | None:
     """Return the path of the timing to write at the end. Raises UsageError where it cannot be, before the run."""
     if path is not None:
         refuse_existing(path, force=force, mark=TIMING)
-        check_can_be_written(path)
     return path
 
 

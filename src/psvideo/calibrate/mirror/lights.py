@@ -17,6 +17,7 @@ from psvideo.calibrate.mirror.sighting import Highlight, Sighting, cut_different
 from psvideo.errors import PsvideoError
 from psvideo.model.arrays import Doubles
 from psvideo.model.rig import too_few_measured
+from psvideo.model.units import counted
 
 DISAGREE_DEG = 10.0
 """Directions from two spheres that differ by more, and do not meet in a point, cannot both be right."""
@@ -25,33 +26,46 @@ MOST_ERROR_DEG = 20.0
 MOST_POSITION_ERROR = 0.15
 """Share of its distance by which a near light's position may be uncertain; beyond, it gets a direction only."""
 
+NAMED = 3
+"""Lights that could not be measured and are named, where too few are left; how many more there are is said."""
+
+
+class TooFewLightsError(PsvideoError):
+    """Spheres that show too few lights; ``found`` is what was taken for the spheres and their highlights."""
+
+    def __init__(self, found: MirrorCalibration) -> None:
+        super().__init__(_few(found.lights, found.sightings))
+        self.found = found
+
 
 def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = None) -> MirrorCalibration:
     """Return every light's direction or position from one or more sightings of mirror spheres.
 
     ``radius_m`` is the spheres' radius; with it, a known focal length and two or more sightings in pictures of one
-    size, near lights get positions. Raises PsvideoError where no light at all could be measured.
+    size, near lights get positions. Raises TooFewLightsError where no light at all could be measured.
     """
     known_m = None if cut_differently(sightings) else radius_m
     names = list(dict.fromkeys(one.light for sighting in sightings for one in sighting.highlights))
     lights = tuple(_measured(name, sightings, known_m) for name in names)
     if all(light.fault for light in lights):
-        raise PsvideoError(_few(lights, sightings))
+        raise TooFewLightsError(MirrorCalibration(lights=lights, sightings=tuple(sightings), warnings=()))
     doubts = doubts_of(lights, sightings, radius_m=radius_m)
     return MirrorCalibration(lights=lights, sightings=tuple(sightings), warnings=doubts)
 
 
 def check_enough(found: MirrorCalibration) -> None:
-    """Raise PsvideoError where fewer than half of the lights were measured, or fewer than the three that normals need,
-    though so many were shown: then what is there is hardly a mirror, and its highlights are chance."""
+    """Raise TooFewLightsError where fewer than half of the lights were measured, or fewer than the three that normals
+    need, though so many were shown: then what is there is hardly a mirror, and its highlights are chance."""
     if too_few_measured(sum(not light.fault for light in found.lights), shown=len(found.lights)):
-        raise PsvideoError(_few(found.lights, found.sightings))
+        raise TooFewLightsError(found)
 
 
 def _few(lights: Sequence[MeasuredLight], sightings: Sequence[Sighting]) -> str:
     lost = [light for light in lights if light.fault]
     measured = len(lights) - len(lost)
-    reasons = "; ".join(f"{light.name}: {light.fault}" for light in lost[:3])
+    reasons = "; ".join(f"{light.name}: {light.fault}" for light in lost[:NAMED])
+    if len(lost) > NAMED:
+        reasons += f"; and {counted(len(lost) - NAMED, 'more light')}"
     told = next((f"{one.doubt.partition('. ')[0]}; " for one in sightings if one.doubt), "")
     what = f"only {measured} of {len(lights)} lights" if measured else "no light"
     return (

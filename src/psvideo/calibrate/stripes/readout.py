@@ -15,7 +15,7 @@ from psvideo.calibrate.stripes.led_pictures import LedPictures
 from psvideo.calibrate.stripes.spectrum import find_fainter
 from psvideo.calibrate.stripes.steps import Direction, find_direction
 from psvideo.calibrate.stripes.waveform import StripeFit, fit_stripes
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.arrays import Doubles
 
 FEWEST_MOVING = 3
@@ -71,9 +71,16 @@ def measure_readout(
 
     ``zoom`` is how many rows of the picture show one row of the sensor; ``near_s`` is roughly what is expected; ``fps``
     is the rate at which the frames were filmed, which gives the direction. Raises PsvideoError that names the pictures
-    where they hold no stripes, fewer than two periods, or stripes that can be read in two ways.
+    where they hold no stripes, fewer than two periods, or stripes that can be read in two ways, and UsageError where
+    they show more rows than a whole frame is said to have.
     """
-    full = rows or round(pictures.height_px / zoom)
+    shown = round(pictures.height_px / zoom)
+    if rows is not None and rows < shown:
+        raise UsageError(
+            f"`rows` {rows}: {pictures.name} shows {shown} rows of the sensor already. Expected the rows of the whole "
+            "frame that it is a part of; leave it out where it is the whole frame."
+        )
+    full = rows or shown
     row_hz = led.rate_hz / zoom  # rows of the picture, as if each were opened by itself
     expected = None if near_s is None else near_s * row_hz / full
     try:

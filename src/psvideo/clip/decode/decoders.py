@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
-from psvideo.formats.paths import check_file
+from psvideo.formats.paths import check_file, not_there
 from psvideo.model.units import counted
 
 Read = TypeVar("Read")
@@ -67,7 +67,7 @@ def guarded(read: Callable[[Path], Read], file: Path) -> Read:
     except PsvideoError:
         raise
     except FileNotFoundError:
-        raise PsvideoError(f"{file}: is not there any more. Check its name, or put it back.") from None
+        raise not_there(file) from None
     except OSError as fault:
         raise PsvideoError(
             f"{file}: cannot be read ({fault.strerror or fault}). Check the file and its disk."

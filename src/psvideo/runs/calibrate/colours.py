@@ -1,6 +1,7 @@
 """The whole of ``psvideo calibrate colours``: pictures of a white card in, the rig with every light's colour out."""
 
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 from psvideo.calibrate.led_colours import LedColours, measure_led_colours, with_colours
@@ -57,16 +58,18 @@ def colours(
     """
     rig_path = rig_out(out, force=force)
     check_albedo(albedo)
+    read_rig(Path(rig))  # its faults are said before pictures are read, or a clip's flashes are sought
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
     target, ground = white_target(found, known, Path(rig), albedo=albedo, box=box)
     with said_of(pictures):
         measured = measure_led_colours(found, known, target, ground=ground, plan=_plan_of(pictures, plan))
     if not measured.known and measured.condition > MOST_COLOUR_CONDITION:
+        nearly = f"nearly the same (condition number {measured.condition:.3g})"
+        alike = nearly if isfinite(measured.condition) else "the same"
         caller.warn(
-            f"the colours of {' and '.join(measured.together)} are nearly the same (condition number "
-            f"{measured.condition:.3g}), and nothing says which lights flash together: those two must not. Give the "
-            "shoot's `plan`, which says it"
+            f"the colours of {' and '.join(measured.together)} are {alike}, and nothing says which lights flash "
+            "together: those two must not. Give the shoot's `plan`, which says it"
         )
     made = with_colours(known, measured)
     write_text(rig_path, format_rig(made))

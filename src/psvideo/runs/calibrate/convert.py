@@ -52,9 +52,15 @@ def convert(
 
 
 def _check_names(path: Path, names: Sequence[str]) -> None:
-    """Raise UsageError where a list of lights is given another number of names, and writes none of these itself."""
-    listed = [light.name for light in read_rig(path).lights]
-    if len(listed) != len(names) and not set(listed) & set(names):
+    """Raise UsageError where a list of lights is given another number of names, or writes some of these itself, which
+    belong to the lights that it gives them to."""
+    listed = read_rig(path).names
+    if len(listed) == len(names) and read_rig(path, plan_lights=names).names != tuple(names):
+        raise UsageError(
+            f"`name`: {path} names its lights itself ({', '.join(listed)}), some of them as here. Leave it out, or "
+            "give every light a name that stands nowhere in that list."
+        )
+    if len(listed) != len(names):
         raise UsageError(
             f"`name`: {path} lists {counted(len(listed), 'light')}, and is given {counted(len(names), 'name')} "
             f"({', '.join(names)}). Give one for each light, in the list's order."

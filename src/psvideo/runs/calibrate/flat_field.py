@@ -13,7 +13,7 @@ from psvideo.errors import UsageError, said_of
 from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
 from psvideo.formats.flat_toml import format_falloff
 from psvideo.formats.rig_toml import format_rig, read_rig
-from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
 from psvideo.model.arrays import Doubles
 from psvideo.model.irradiance.ground import Ground, ground_of
 from psvideo.model.irradiance.near_light import is_near
@@ -64,8 +64,10 @@ def flat_field(
     if flat_path is not None:
         if flat_path.resolve() == rig_path.resolve():
             raise UsageError(f"`out` and `flat` both name {flat_path}. Give each a file of its own.")
+        check_ending(flat_path, ".toml", name="flat")
         refuse_existing(flat_path, force=force, mark=FLAT_SCHEMA)
     check_albedo(albedo)
+    read_rig(Path(rig))  # its faults are said before pictures are read, or a clip's flashes are sought
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
     warn_of_unmeasured(known, found.names, caller)

@@ -41,6 +41,7 @@ def intensities(
     ``matte_sphere``. Raises UsageError where the output exists, and PsvideoError where the scene shows too little.
     """
     rig_path = rig_out(out, force=force)
+    read_rig(Path(rig))  # its faults are said before pictures are read, or a clip's flashes are sought
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
     warn_of_unmeasured(known, found.names, caller)

@@ -13,11 +13,12 @@ from psvideo.calibrate.sphere.outline import Outline, find_outlines, given_outli
 from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.ranks import median
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, said_of
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.screen_pictures import write_png
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig, too_few_measured
+from psvideo.model.units import counted
 from psvideo.pictures.matte_sphere import matte_picture
 from psvideo.runs.calibrate.reading import (
     check_albedo,
@@ -31,6 +32,10 @@ from psvideo.runs.steps.caller import PYTHON, Caller
 
 FLATTER_DEG = 2.0
 """From here on shading that is flatter than a matte sphere's is warned of."""
+
+
+NAMED = 3
+"""Lights that could not be measured and are named, where all fail; how many more there are is said."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +89,8 @@ def matte_sphere(
         if circle is None
         else held_against_picture(found, given_outline(view, circle), surface="matte")
     )
-    lights = measure_matte_sphere(found, outline, albedo=albedo)
+    with said_of(pictures):
+        lights = measure_matte_sphere(found, outline, albedo=albedo)
     rig = matte_rig(lights, view)
     shown = matte_picture(found, outline, lights)
     too_few = too_few_measured(len(rig.lights), shown=len(lights))
@@ -116,7 +122,8 @@ def _few(lights: Sequence[MatteLight], doubt: str) -> str:
     lost = [light for light in lights if light.fault]
     measured = len(lights) - len(lost)
     what = f"only {measured} of {len(lights)} lights" if measured else "no light"
-    faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lost[:3])
+    more = f"; and {counted(len(lost) - NAMED, 'more light')}" if len(lost) > NAMED else ""
+    faults = doubt or "; ".join(f"{light.name}: {light.fault}" for light in lost[:NAMED]) + more
     return (
         f"{what} could be measured ({faults}). Expected a matte sphere of one colour, lit by one lamp in each picture, "
         "in a dark room or with a picture named ambient that takes the room's light off."

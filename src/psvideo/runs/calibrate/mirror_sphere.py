@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from psvideo.calibrate.mirror.lights import calibrate_lights, check_enough
+from psvideo.calibrate.mirror.lights import TooFewLightsError, calibrate_lights, check_enough
 from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
 from psvideo.calibrate.picture_sets import read_picture
@@ -70,11 +70,11 @@ def mirror_sphere(
     except SphereNotFoundError as fault:
         write_png(of_failure, faulty_picture(fault.picture))
         raise PsvideoError(f"{fault} See {of_failure}.") from None
-    found = calibrate_lights(sightings, radius_m=radius_m)
     try:
+        found = calibrate_lights(sightings, radius_m=radius_m)
         check_enough(found)
-    except PsvideoError as fault:
-        write_png(of_failure, sphere_picture(found))
+    except TooFewLightsError as fault:
+        write_png(of_failure, sphere_picture(fault.found))
         raise PsvideoError(f"{fault} See {of_failure}.") from None
     write_png(picture, sphere_picture(found))
     write_text(rig_path, format_rig(found.rig))

@@ -67,7 +67,7 @@ def calibrate_takes(
     """
     folder, paths = path_of("out", out), [path_of("pictures", path) for path in pictures]
     if folder.suffix == ".toml" or folder.is_file():
-        raise UsageError(f"{folder}: is a file, and every take gets its own rig. Give a folder.")
+        raise UsageError(f"{folder}: names a file, and every take gets its own rig. Name a folder.")
     if options.get("flat") is not None:
         raise UsageError("`flat` is the falloff of a single take. Leave it out here, and measure that take alone.")
     rigs = {path: folder / f"{name}.toml" for path, name in zip(paths, names_of("pictures", paths), strict=True)}

@@ -12,6 +12,7 @@ from psvideo.live.incoming.recording import FIRST_NUMBER, recorded_words, record
 from psvideo.live.running import Running
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
+from psvideo.model.units import counted
 from psvideo.runs.steps.caller import Caller
 from psvideo.strobe.runlog import LOG_NAME, RunLog, format_log
 
@@ -52,7 +53,8 @@ def check_found(running: Running, record_path: Path | None) -> None:
     if running.chain.follower is not None:
         return
     frames, record = running.chain.count.seen, running.recording
-    few = f"{running.source.name}: {frames} frames are too few to find the strobe in. Let it run for longer."
+    so_few = f"{counted(frames, 'frame')} {'is' if frames == 1 else 'are'}"
+    few = f"{running.source.name}: {so_few} too few to find the strobe in. Let it run for longer."
     whole = "" if record is None or record_path is None else recorded_words(record_path, record)
     raise NoStrobeError(f"{running.chain.why or few} {whole}".rstrip())
 

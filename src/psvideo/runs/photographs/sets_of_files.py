@@ -5,12 +5,19 @@ from pathlib import Path
 
 from psvideo.calibrate.picture_sets import LightFiles, read_picture, read_sets
 from psvideo.clip.stated import relative_exposures, says_as, stated_by
+from psvideo.errors import UsageError
 from psvideo.model.camera import Encoding
 from psvideo.runs.photographs.opened_sets import LightSets, Reading
 
 
 def sets_of_files(files: LightFiles, planned: Encoding | None, reading: Reading) -> LightSets:
-    """Return pictures as sets; ``planned`` is how they code light where a plan says it."""
+    """Return pictures as sets; ``planned`` is how they code light where a plan says it. Raises UsageError where the
+    first light of a clip's flashes is named: they are none."""
+    if reading.first_light is not None:
+        raise UsageError(
+            f"`first_light` {reading.first_light}: is for strobed clips, and {files.folder} holds pictures that each "
+            "show the light that they are named after. Leave it out."
+        )
     read, notes = _encoding(files, planned, reading.transfer)
     aside = tuple(f"{one}: is assumed to be no light's {_kind(one)} and left aside" for one in files.left_aside)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)

@@ -14,6 +14,7 @@ from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.formats.clocks_json import read_clocks
 from psvideo.formats.frame_rates import broadcast_fps
 from psvideo.formats.free_folders import refuse_folder
+from psvideo.formats.paths import not_there
 from psvideo.formats.whole_folders import begun_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
@@ -59,10 +60,13 @@ class Output:
 
 def _identity(take: Take) -> list[object]:
     """Return what distinguishes a take from others, and from itself once its plan, its strobe's log (by which the plan
-    is as played) or a file of it was changed."""
+    is as played) or a file of it was changed. Raises PsvideoError where a file of it is gone."""
     clip = take.clip
     files = clip.files if clip.is_movie else [clip.file_of(number) for number in take.numbers]
-    facts = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files]
+    try:
+        facts = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files]
+    except FileNotFoundError as fault:
+        raise not_there(Path(fault.filename)) from None
     return [clip.path.resolve(), sha256_of(clip.plan_path), clip.plan, take.numbers, facts]
 
 

@@ -36,6 +36,8 @@ UNSURE = 0.05
 """Share of a flash from which on a standard error is worth a word."""
 MUCH = 0.5
 """Share of the times' error from which on its source is worth a word."""
+READOUT_FOUND = "The readout was found to take"
+"""What begins the remark on a readout that no plan says, which is all that a measurement of it is for."""
 
 
 def remarks(
@@ -118,7 +120,7 @@ def _camera(plan: Plan, found: ClipFit) -> Iterator[str]:
     if camera.readout_s is None and found.slack_s > 0:
         yield "The readout cannot be measured from this clip: no row opens or closes during a flash."
     elif camera.readout_s is None:
-        yield f"The readout was found to take {_ms(abs(readout_s), error_s)}, {_direction(readout_s)}."
+        yield f"{READOUT_FOUND} {_ms(abs(readout_s), error_s)}, {_direction(readout_s)}."
     elif abs(readout_s - camera.readout_s) > GROSS * max(abs(camera.readout_s), abs(readout_s)):
         yield _wrong_readout(camera.readout_s, readout_s, error_s)
     elif camera.readout_s and abs(readout_s / camera.readout_s - 1) > CHANGED:
@@ -146,7 +148,9 @@ def _wrong_readout(planned_s: float, readout_s: float, error_s: float) -> str:
 
 
 def _ms(time_s: float, error_s: float | None = None) -> str:
-    return f"{time_s * 1e3:.5g} ms" + (f" +- {error_s * 1e3:.1g} ms" if error_s else "")
+    if not error_s:
+        return f"{time_s * 1e3:.5g} ms"
+    return f"{time_s * 1e3:.5g} ms +- {f'{error_s * 1e3:.1g} ms' if error_s > 1e-6 else f'{error_s * 1e6:.1g} us'}"
 
 
 def _degrees(camera: Camera, exposure_s: float) -> str:

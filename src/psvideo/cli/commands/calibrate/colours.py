@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Annotated
 
 import typer
@@ -55,7 +56,8 @@ def colours(
     for name, seen, error in zip(found.names, found.seen, found.error, strict=True):
         shares = ", ".join(f"{value / seen.max():.4f}" for value in seen)
         voice.say(f"  {name:12} intensity {seen.max():.4g}  colour {shares}  +- {error.max():.2%}")
-    voice.say(f"Hardest to tell apart: {', '.join(found.together)}, condition number {found.condition:.2f}.")
+    how = f"condition number {found.condition:.2f}" if isfinite(found.condition) else "whose colours are the same"
+    voice.say(f"Hardest to tell apart: {', '.join(found.together)}, {how}.")
     voice.say(f"{out}: {counted(len(found.names), 'light')} with colours.")
     voice.result(
         {
@@ -64,6 +66,6 @@ def colours(
                 for name, seen, error in zip(found.names, found.seen, found.error, strict=True)
             ],
             "together": found.together,
-            "condition": found.condition,
+            "condition": found.condition if isfinite(found.condition) else None,
         }
     )
