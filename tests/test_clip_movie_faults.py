@@ -41,6 +41,25 @@ def test_truncated_movies_are_refused_by_name(
         list(read_frames(open_clip(tmp_path / name, plan=plan)))
 
 
+@pytest.mark.parametrize("name", ["x.mp4", "x.mov"])
+def test_a_movie_that_breaks_off_is_said_to_lack_what_cameras_write_last(
+    name: str, tmp_path: Path, written_plan: Callable[..., Path]
+) -> None:
+    """FFmpeg calls such files invalid, and one whose index is cut a file without video."""
+    write_movie(tmp_path / name, grey_ramp(24), codec="libx264")
+    plan, data = written_plan(rows=32, cols=48), (tmp_path / name).read_bytes()
+    index = data.index(b"moov") - 4
+    pictures = data.index(b"mdat") - 4
+    for end, said in (
+        (index - 9, rf"of the {index - pictures} bytes of its last part \(mdat\) {index - 9 - pictures} are there"),
+        (index, r"lacks its index \(moov\)"),
+        (index + 200, rf"of the {len(data) - index} bytes of its last part \(moov\)"),
+    ):
+        (tmp_path / name).write_bytes(data[:end])
+        with pytest.raises(PsvideoError, match=rf"{name}: is truncated: .*{said}"):
+            open_clip(tmp_path / name, plan=plan)
+
+
 @pytest.mark.parametrize("name", ["x.mkv", "x.ts", "x.mp4"])
 def test_a_movie_that_begins_late_is_whole_and_one_that_breaks_off_is_not(
     tmp_path: Path, written_plan: Callable[..., Path], name: str

@@ -12,6 +12,7 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from psvideo.clip.decode.movies.movie_codes import rgb_codes
+from psvideo.clip.decode.movies.movie_ends import how_it_breaks_off
 from psvideo.clip.decoded import CodedPicture
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
@@ -62,7 +63,8 @@ def opened_movie(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     try:
         with av.open(str(path), options=AS_RECORDED) as container:
             if not (moving := moving_streams(container)):
-                raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
+                broken = how_it_breaks_off(path) or "holds no video. Name the movie that the camera recorded."
+                raise PsvideoError(f"{path}: {broken}")
             stream = moving[0]
             if stream.codec_context is None:
                 raise PsvideoError(f"{path}: {_sealed(path) or 'is coded in a way that is not read'}. {IN_THE_CLEAR}")
@@ -73,6 +75,8 @@ def opened_movie(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
             raise PsvideoError(f"{path}: is empty (0 bytes). Copy it again from the camera's card.") from None
         if sealed := _sealed(path):
             raise PsvideoError(f"{path}: {sealed}. {IN_THE_CLEAR}") from fault
+        if broken := how_it_breaks_off(path):
+            raise PsvideoError(f"{path}: {broken}") from fault
         raise PsvideoError(
             f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault}). "
             "Copy it again from the camera's card."
