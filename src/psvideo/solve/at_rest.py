@@ -17,20 +17,22 @@ that are pooled, so that a run that begins with a block of them has the same mea
 
 @dataclass(frozen=True, kw_only=True)
 class AtRest:
-    """The ``doubts`` of rounds up to ``number``, since which everything stood."""
+    """The ``doubts`` of rounds up to ``number``: of those since which everything stood, and the last one's normals."""
 
     number: int
     doubts: Doubts
 
     @classmethod
-    def since(cls, one: Round, doubts: Doubts) -> "AtRest | None":
-        """Return what a round leaves to the next one: nothing where it moved, or where frames of it were missing."""
+    def since(cls, one: Round, doubts: Doubts) -> "AtRest":
+        """Return what a round leaves to the next one: no looks where it moved, or where frames of it were missing."""
         whole = one.unsure is None and one.doubtful is None and all(plate.seen.all() for plate in one.plates)
-        return cls(number=one.number, doubts=doubts) if whole else None
+        return cls(number=one.number, doubts=doubts if whole else Doubts(latest=doubts.latest))
 
     def until(self, one: Round) -> Doubts:
-        """Return the doubts that hold in the next round too, and whether it looks again; none where it moved."""
-        stood = one.stood is not None and bool(one.stood.all()) and one.unsure is None
-        if not stood or one.number != self.number + 1:
+        """Return the doubts that hold in the next round too, and whether it looks again; no looks where it moved."""
+        if one.number != self.number + 1:
             return Doubts()
-        return replace(self.doubts, look_again=one.number % LOOKS_EVERY == 0)
+        if one.stood is None or not one.stood.all() or one.unsure is not None:
+            return Doubts(latest=self.doubts.latest, stood=one.stood)
+        again = one.number % LOOKS_EVERY == 0 or not self.doubts.looks
+        return replace(self.doubts, look_again=again, stood=one.stood)

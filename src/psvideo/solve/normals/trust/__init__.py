@@ -12,5 +12,5 @@ shadows that pass for light (``lit_shadows``), ``near_spread`` (near lights, who
 turn normals under four and five lights), and ``unchecked`` (what three lights leave of real surfaces, and show hardly
 anywhere; and how well few lights check each other). Loops of the signs are in ``signs_kernel``. ``doubting`` says how
 much each counts, and makes one doubt of them; its loop is ``doubting_kernel``. ``doubts`` are those of
-several looks at what stands still.
+several looks at what stands still, and ``repeats`` shows by them how large noise is that detail does not show.
 """

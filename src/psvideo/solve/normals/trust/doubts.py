@@ -5,15 +5,16 @@ only when one takes the place of another.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Flags, Floats
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
+from psvideo.solve.normals.trust.repeats import Repeat, noise_times
 from psvideo.solve.normals.trust.signs import Signs
 
 LIKELY_USUAL = np.float32(0.75)
@@ -50,11 +51,16 @@ class Doubt:
 @dataclass(frozen=True, kw_only=True)
 class Doubts:
     """The last ``looks`` at a surface since anything changed, the ``noise`` of the last one's plates, None before the
-    first, and whether to ``look_again`` rather than go by them."""
+    first, and whether to ``look_again`` rather than go by them. ``latest`` are the normals of the round before, and
+    ``stood`` (row, col), on a grid of its own over the picture, is where nothing changed since then. ``repeated``: the
+    looks know of a repeat how large noise is."""
 
     looks: tuple[Doubt, ...] = ()
     noise: PlateNoise | None = None
     look_again: bool = True
+    latest: Repeat | None = None
+    stood: Flags | None = None
+    repeated: bool = False
 
     @property
     def known_noise(self) -> PlateNoise | None:
@@ -63,7 +69,18 @@ class Doubts:
 
     def and_of(self, look: Doubt, noise: PlateNoise) -> "Doubts":
         """Return the last looks, another one among them."""
-        return Doubts(looks=(*self.looks, look)[-POOLED_LOOKS:], noise=noise)
+        return Doubts(looks=(*self.looks, look)[-POOLED_LOOKS:], noise=noise, repeated=self.repeated)
+
+    def beside(self, now: Repeat) -> "tuple[Doubts, Floats | None]":
+        """Return these doubts where another round shows ``now``, and by how much the square of noise is larger at every
+        point than detail shows it, None where no repeat tells. A first repeat that does makes them look again, and
+        looks before it count no more; later ones are asked when they look."""
+        if self.latest is None or self.stood is None or (self.repeated and not self.look_again):
+            return self, None
+        times = noise_times(self.latest, now, self.stood)
+        if times is None or self.repeated:
+            return replace(self, repeated=True), times
+        return replace(self, repeated=True, looks=(), look_again=True), times
 
     @cached_property
     def mean(self) -> Doubt:

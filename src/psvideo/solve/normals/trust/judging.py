@@ -21,6 +21,7 @@ from psvideo.solve.normals.trust.doubts import Doubt, Doubts
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.noise_spread import NoiseSpread, Spreading
+from psvideo.solve.normals.trust.repeats import Repeat
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, every_nth
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
@@ -57,10 +58,15 @@ def judged(
     some = every_nth(surface, one.step_of(surface.valid.shape))
     spread = NoiseSpread.of(some, one, noise, how.spreading, near)
     points = spread.points(some)
+    latest = None if one.indirect is None else Repeat.of(points, one.indirect)
     doubts, moving = before, None
-    if before.look_again:
+    if latest is not None:
+        doubts, noisier = before.beside(latest)
+        points = replace(points, noisier=noisier)
+    if doubts.look_again:
         found, moving = _found(points, one, noise, how)
-        doubts = before.and_of(found, noise)
+        doubts = doubts.and_of(found, noise)
+    doubts = replace(doubts, latest=latest)
     shown = doubts.mean
     at_points = spread.judged(points.surface, np.stack([shown.doubt_deg, shown.usual_deg]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit

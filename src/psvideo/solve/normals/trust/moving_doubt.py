@@ -108,7 +108,7 @@ def moved_deg(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS)
     turned, likely = np.sqrt(turned) * scale, np.sqrt(likely) * scale
     if one.left is None or len(one.plates) <= SOLVED:
         return np.asarray(turned, np.float32)
-    dark = np.asarray(np.float32(noise.dark / strength.mean()) / size, np.float32)
+    dark = _noise_share(points, noise, float(strength.mean()))
     share = _off_share(one.left, points.known, shown / (size * size), dark)
     known = (turned <= MOST_DEG) | (share < EXPLAINED)
     return np.asarray(np.where(known, likely * share, turned), np.float32)
@@ -126,6 +126,14 @@ def _off_share(left: Left, known: Mask, off: Floats, noise: Floats) -> Floats:
     return np.asarray(np.where(free > 0, 1 / (1 + np.exp(np.clip(odds / 2, -MOST_ODDS, MOST_ODDS))), 1), np.float32)
 
 
+def _noise_share(points: ThinSurface, noise: PlateNoise, lamp: float) -> Floats:
+    """Return how large noise is beside albedo: in the dark, and where repeats show more, in light."""
+    dark = np.asarray(np.float32(noise.dark / lamp) / np.maximum(points.brightness, LEAST), np.float32)
+    if points.noisier is None:
+        return dark
+    return np.asarray(np.maximum(dark, np.radians(points.noise_deg * np.sqrt(points.noisier))), np.float32)
+
+
 def _left_over(left: Left, known: Mask, noise: Floats) -> tuple[Floats, Floats, Floats]:
     """Return how many lights check a normal, the square that each usually leaves, and all that is left around."""
     free = np.maximum(left.lights - np.float32(SOLVED), 0)
@@ -138,8 +146,7 @@ def checked(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS) -
     """Return how well one normal explains the points' plates; None where three lights leave nothing to see."""
     if one.left is None or len(one.plates) <= SOLVED:
         return None
-    lamp = one.lit.intensities.mean()
-    dark = np.asarray(np.float32(noise.dark / lamp) / np.maximum(points.brightness, LEAST), np.float32)
+    dark = _noise_share(points, noise, float(one.lit.intensities.mean()))
     free, usual, seen = _left_over(one.left, points.known, dark)
     puzzling = np.where(free > 0, 1 - np.exp(-seen / (2 * np.maximum(free, 1) * usual)), 1)
     return Checked(beyond=len(one.plates) - SOLVED, puzzling=np.asarray(puzzling, np.float32))

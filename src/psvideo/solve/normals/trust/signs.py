@@ -120,7 +120,8 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     if one.indirect is None:
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
     lights, plain = len(one.plates), points.surface.error_deg is None
-    squares, noise, shown = _beyond_noise(points, one.indirect.wider)
+    wider = one.indirect.wider if points.noisier is None else one.indirect.wider * points.noisier
+    squares, noise, shown = _beyond_noise(points, wider)
     still = points.known
     if turned_deg is not None:
         rests = cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
@@ -152,7 +153,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         torn_deg=torn_deg,
         likely_torn_deg=likely_torn_deg,
         noise_deg=points.noise_deg,
-        lost_deg=points.noise_deg * np.sqrt(one.indirect.wider - 1),
+        lost_deg=points.noise_deg * np.sqrt(wider - 1),
         hidden=hidden_of(one.lit, plain=plain, beside_slope=not one.moved),
         plain=plain,
         by_model_deg=0.0 if by_model is None else by_model,

@@ -24,13 +24,15 @@ picture's, and over no less than this many points: their residuals are of noise 
 @dataclass(frozen=True, kw_only=True)
 class ThinSurface:
     """Every ``step``-th row and column of a surface, and errors there in degrees: what noise makes, what residuals
-    predict, and what they would predict of nothing but noise."""
+    predict, and what they would predict of nothing but noise. ``noisier``: by how much the square of noise is larger
+    than that, as repeats show it (``repeats.py``); None where they do not."""
 
     step: int
     surface: Surface
     noise_deg: Floats
     fit_deg: Floats
     fit_of_noise_deg: Floats
+    noisier: Floats | None = None
 
     @cached_property
     def planes(self) -> Floats:

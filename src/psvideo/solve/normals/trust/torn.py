@@ -29,7 +29,8 @@ def torn_angles_deg(
     fill_torn(_along_rays(points, view, shape), points.known_bytes, float(LEAST_FACING), float(MOST_TORN), torn)
     square_torn(blurred(torn, TORN).reshape(2, -1), torn.reshape(2, -1), math.degrees(TORN / 2))
     angles = np.empty((2, *points.known.shape), np.float32)
-    given = line(points.noise_deg), line(misfit_deg), line(uneven)
+    noise_deg = points.noise_deg if points.noisier is None else points.noise_deg * np.sqrt(points.noisier)
+    given = line(noise_deg), line(misfit_deg), line(uneven)
     shares = float(SURELY_TORN), float(TORN_OF_NOISE)
     fill_torn_deg(blurred(torn, NEAR).reshape(2, -1), *given, *shares, angles.reshape(2, -1))
     return angles[0], angles[1]
