@@ -64,6 +64,49 @@ def test_what_light_shines_through_is_solved_as_what_it_is(ways: Array, share: f
     np.testing.assert_allclose(np.median(found.albedo[found.valid], axis=0), [0.6, 0.45, 0.35], rtol=0.06)
 
 
+def before_a_wall(
+    ways: Array, shade: Callable[[Array], Array], leaning: Array = np.array([0.1, 0.2, 1.0])
+) -> tuple[list[NDArray[np.float32]], Array, NDArray[np.bool_]]:
+    """The head, a third of the picture, before a matte wall of many paints."""
+    plates, normals, inside = filmed(ways, shade)
+    rng, size = np.random.default_rng(5), int(1.5 * SIZE)
+    facing, at = leaning / np.linalg.norm(leaning), np.s_[SIZE // 4 : SIZE // 4 + SIZE, SIZE // 4 : SIZE // 4 + SIZE]
+    paint = rng.uniform(0.2, 0.7, (size // 9, size // 9, 3)).repeat(9, axis=0).repeat(9, axis=1)
+    pictures = []
+    for plate, way in zip(plates, ways, strict=True):
+        whole = np.maximum(facing @ way, 0) * paint + rng.normal(0, NOISE, paint.shape)
+        whole[at] = np.where(inside[..., None], plate, whole[at])
+        pictures.append(whole.astype(np.float32))
+    truth, subject = np.broadcast_to(facing, paint.shape).copy(), np.zeros((size, size), np.bool_)
+    subject[at] = inside
+    truth[at] = np.where(inside[..., None], normals, facing)
+    return pictures, truth, subject
+
+
+@pytest.mark.parametrize("share", [0.15, 0.35])
+def test_what_light_shines_through_is_seen_before_a_matte_wall_which_stays_matte(
+    monkeypatch: pytest.MonkeyPatch, share: float
+) -> None:
+    plates, truth, subject = before_a_wall(UNEVEN, lambda cosine: lit_through(cosine, share))
+    found = solve_images(plates, UNEVEN)
+    assert found.misfit is not None
+    assert found.misfit.reflectance is not None
+    assert found.misfit.reflectance.soft == pytest.approx(share / (1 + share), abs=0.04)
+    monkeypatch.setattr(reflectance_fit, "_worst_fitting", lambda points: points)
+    before = solve_images(plates, UNEVEN)
+    assert off_deg(found, truth, subject).mean() < 0.3 * off_deg(before, truth, subject).mean()
+    assert off_deg(found, truth, ~subject).mean() < off_deg(before, truth, ~subject).mean() + 0.1
+
+
+@pytest.mark.parametrize("turned_deg", [0, 3])
+@pytest.mark.parametrize("power", [1.0, 1.2])
+def test_a_matte_or_steep_thing_before_a_wall_is_not_soft(power: float, turned_deg: float) -> None:
+    plates, *_ = before_a_wall(UNEVEN, lambda cosine: np.maximum(cosine, 0) ** power)
+    wrong = UNEVEN + np.radians(turned_deg) * np.random.default_rng(1).normal(size=UNEVEN.shape) / np.sqrt(2)
+    misfit = solve_images(plates, wrong / np.linalg.norm(wrong, axis=1, keepdims=True)).misfit
+    assert misfit is None or misfit.reflectance is None or misfit.reflectance.soft == 0
+
+
 def test_its_light_beyond_the_shadows_edge_is_not_taken_for_other_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
     plates, normals, inside = filmed(UNEVEN, lambda cosine: lit_through(cosine, 0.2))
     found = solve_images(plates, UNEVEN)
