@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -70,6 +71,18 @@ def test_the_page_is_whole_on_a_laptop_and_asks_for_nothing(
         shutil.copy(tmp_path / "report.png", PICTURE) if not PICTURE.exists() else None
         away = np.abs(_small(picture) - _small(read_picture(PICTURE)))
         assert away.mean() < 2, "docs/report.md shows an old report: delete its picture to have it made again"
+
+
+def test_on_a_phone_every_column_of_figures_is_seen(report: Path, playwright: Playwright, chromium: str) -> None:
+    browser = playwright.chromium.launch(executable_path=chromium, headless=True, args=ALONE)
+    page = browser.new_context(viewport={"width": 390, "height": 844}).new_page()
+    page.goto(report.as_uri())
+    page.locator("details summary").click()
+    assert re.fullmatch(r"All \d results, the worst first", page.locator("details summary").inner_text())
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    hidden = "[...document.querySelectorAll('.wide')].map(one => one.scrollWidth - one.clientWidth)"
+    assert max(page.evaluate(hidden)) <= 0
+    browser.close()
 
 
 def _small(picture: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -5,6 +5,7 @@ from typing import Literal
 
 from psvideo.live.following.follow import State
 from psvideo.model.timing import Order
+from psvideo.model.units import counted
 
 LiveState = Literal["preparing"] | State
 """Before the source is opened, live is preparing: it loads, and compiles where nothing is kept yet."""
@@ -113,7 +114,7 @@ class LiveSummary:
     @property
     def words(self) -> str:
         """The summary in two or three sentences."""
-        text = f"{self.frames} frames in {self.seconds:.1f} s, {self.lost} lost; {self.results} results."
+        text = f"{self.frames} frames in {self.seconds:.1f} s, {self.lost} lost; {counted(self.results, 'result')}."
         if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
             after = "" if self.first_lock_s is None else f" after {self.first_lock_s:.1f} s of footage"
             again = "" if self.locks == 1 else f", and found again {_times(self.locks - 1)}"

@@ -124,12 +124,14 @@ def _worst(report: RunReport) -> str:
     grid = f'<div class="grid4">{tiles}</div>' if tiles else "<p>No result stands out as bad.</p>"
     ordered = sorted(report.instants, key=lambda one: (-badness(one)[0], one.number))[:MOST_ROUNDS]
     rows = "".join(_round_row(one) for one in ordered)
-    worst = "The only result" if len(ordered) == 1 else f"The {len(ordered)} worst of {len(report.instants)} results"
-    shown = worst if ordered else "No results"
+    count, of_all = len(ordered), len(report.instants)
+    several = f"All {count} results, the worst first" if count == of_all else f"The {count} worst of {of_all} results"
+    shown = ("No results", "The only result")[count] if count < 2 else several
     head = (
         "<tr><th>number</th><th>time, s</th><th>valid</th><th>saturated</th><th>rows unseen</th><th>ambient</th></tr>"
     )
-    return f'{grid}<details><summary>{shown}</summary><table class="figures">{head}{rows}</table></details>'
+    table = f'<div class="wide"><table class="figures">{head}{rows}</table></div>'
+    return f"{grid}<details><summary>{shown}</summary>{table}</details>"
 
 
 def _round_row(one: InstantFacts) -> str:

@@ -41,7 +41,8 @@ svg path,svg line{fill:none;stroke-width:1.8}svg .area{fill:var(--c0);opacity:.7
     + """
 details summary{cursor:pointer;color:var(--soft);margin:.8rem 0 .4rem}
 @media(max-width:600px){.lines tr{display:grid;grid-template-columns:auto 1fr;border-bottom:1px solid var(--rule)}
-.lines td,.lines th{border:0}.lines td:last-child{grid-column:1/-1;padding-top:0}.grid2 svg text{font-size:15px}}
+.lines td,.lines th{border:0}.lines td:last-child{grid-column:1/-1;padding-top:0}.grid2 svg text{font-size:15px}
+.figures{font-size:.74rem}.figures td,.figures th{padding-right:.3rem}}
 @media print{main{max-width:none}section{break-inside:avoid}}
 """
 )
