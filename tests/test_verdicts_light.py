@@ -1,5 +1,6 @@
 """What is said of exposure, curve and ambient light, on footage on either side of a border."""
 
+import re
 from array import array
 from collections.abc import Sequence
 from dataclasses import replace
@@ -249,6 +250,19 @@ def test_a_clipped_take_is_not_told_to_give_more_light(clip: float) -> None:
     assert (lacking.advice == of_validity.CLIPPING_FIRST) == (clip > 0.02)
 
 
+@pytest.mark.parametrize(("reached", "more"), [(0.9, True), (1.0, False)])
+def test_where_three_lights_reach_all_of_a_clipped_subject_none_is_told_to_reach_more(
+    reached: float, more: bool
+) -> None:
+    one = Footage(lights=4, clip=0.2, clipping=4, noise=0, solved=True).observed(0)
+    facts = KeptFacts(replace(fact, measured_share=reached, valid_share=0.1) for fact in one.facts)
+    lines = judgements(plan_of(one.lights), timing_of(), replace(one, facts=facts))
+    (lacking,) = (line for line in lines if line.subject == "validity")
+    assert f"reach {100 * reached:.0f} % of the subject" in lacking.found
+    assert "See the line on clipping first" in (lacking.advice or "")
+    assert ("reach every part" in (lacking.advice or "")) == more
+
+
 def _quantised(step: int) -> tuple[list[np.ndarray], float]:
     """Return a ball under three lights 38 degrees from the axis, in 8 bits of gamma 2.2 of which only every ``step``-th
     code is used, and by how many degrees that turns the normals that all lights reach."""
@@ -285,3 +299,9 @@ def test_even_colours_and_fine_codes_are_not_taken_for_few_levels() -> None:
     assert code_step([patches]) is None
     assert code_step([fine]) is None or coarse_steps(code_step([fine])) is None
     assert code_step([np.zeros((40, 40), np.float32), np.full((40, 40, 3), np.nan, np.float32)]) is None
+
+
+def test_of_many_lights_that_clip_the_worst_are_named_and_the_rest_is_counted() -> None:
+    one = Footage(lights=8, clip=0.2, clipping=6, noise=0, solved=True).observed(0)
+    (clipping,) = (line for line in exposure(one) if line.subject == "clipping")
+    assert re.fullmatch(r"6 of 8 lights clip parts of the subject: ('\w+' \d+ %(, | and )){4}2 more\.", clipping.found)

@@ -167,8 +167,8 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
         yield Judgement(
             subject="clipping",
             grade="bad" if few and max(one.clipped_share for one in over.values()) > lost else "doubtful",
-            found=f"{len(over)} of {len(levels)} lights clip: "
-            f"{first_of({light: one.clipped_share for light, one in over.items()})} of the subject.",
+            found=f"{len(over)} of {len(levels)} lights clip parts of the subject: "
+            f"{first_of({light: one.clipped_share for light, one in over.items()})}.",
             advice="Lower their powers (or durations) to about "
             f"{_percent(min(one.right_power(whole) for one in over.values()))} of what they are, or close the "
             "aperture.",

@@ -28,10 +28,12 @@ NONE_VALID = 0.05
 off. (A cat under twelve directions that are a few degrees off: as little, and accuracy says by how much.)"""
 NONE_SAID = 0.005
 """With less, the share is said as 0 %, and there is nothing elsewhere."""
-CLIPPING_FIRST = (
-    "See the line on clipping first: what clips is no measurement, and more light clips more. Beyond that, place the "
-    "lights nearer to the camera's axis, or use more of them, so that three reach every part."
+REACH_MORE = (
+    " Beyond that, place the lights nearer to the camera's axis, or use more of them, so that three reach every part."
 )
+CLIPPING_FIRST = f"See the line on clipping first: what clips is no measurement, and more light clips more.{REACH_MORE}"
+ALL_REACHED = 0.995
+"""From this share on all of the subject is said to be reached, and nothing of how to reach more."""
 EXPOSURE_FIRST = "See the line on exposure first: noise alone may turn normals that far."
 RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
 LIGHTS_FIRST = "See the line on lights first: what it names costs normals."
@@ -80,7 +82,7 @@ def validity(observed: Observed, *, first: str = "") -> Iterator[Judgement]:
             grade=grade,
             found=f"Three lights reach {100 * reach:.0f} % of the subject, and {found}: "
             f"{rest}." + (" These normals serve a look, and no measurement." if usual < NONE_VALID else ""),
-            advice=first or _trusting(observed),
+            advice=(first.removesuffix(REACH_MORE) if reach >= ALL_REACHED else first) or _trusting(observed),
         )
         return
     yield Judgement(
