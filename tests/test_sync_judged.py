@@ -768,11 +768,31 @@ def test_losses_of_square_pulses_are_those_of_any_pulses(lights: int, shutter: f
 
 
 def test_losses_of_rows_that_open_together_are_those_of_each_row_alone_to_the_bit(make_plan: PlanMaker) -> None:
-    """Such rows are scored side by side, and others one by one: a place that no number holds beside a time is none."""
+    """Such rows share what they see; places that no number holds beside a time are the same, and share nothing."""
     plan, rows = two_windows(make_plan)
     clocks = turned_clocks(np.linspace(0.0, plan.cycle_s, 40), np.array([-9000.0, 0.0, 9000.0]), 0.1)
     together = losses(plan, rows, clocks, first_guess(plan), place=np.zeros(8))
-    assert np.array_equal(together, losses(plan, rows, clocks, first_guess(plan), place=np.full(8, 1e-300)))
+    apart = losses(plan, rows, clocks, first_guess(plan), place=np.linspace(0.0, 1e-300, 8))
+    assert np.array_equal(together, apart)
+
+
+@pytest.mark.parametrize("lights", [1, 3, 12])
+@pytest.mark.parametrize("faster", [1.0, 0.02])
+def test_losses_of_a_clock_are_the_same_whichever_clocks_are_scored_beside_it(
+    lights: int, faster: float, make_plan: PlanMaker
+) -> None:
+    """They are worked on together: of few that are far apart a row sees other flashes under each, of a strobe that is
+    faster than the plan many."""
+    film = make_plan(height_px=ROWS, width_px=COLUMNS, lights=tuple("abcdefghijkl"[:lights]))
+    shorter = tuple(replace(one, duration_s=faster * one.duration_s) for one in film.flashes)
+    plan = replace(film, dark_s=0.6 * faster * film.dark_s, flashes=shorter)
+    rows = replace(two_windows(make_plan)[1], place=np.arange(8.0) * ROWS / 8)
+    far = np.linspace(0.0, plan.cycle_s, 100, endpoint=False)
+    clocks = turned_clocks(far, np.array([0.0, -9000.0, 9000.0]), 0.1)
+    beside = losses(plan, rows, clocks, first_guess(plan), place=rows.place)
+    for n in (0, 7, 99, 100, 250, 299):
+        alone = losses(plan, rows, clocks.only(np.array([n])), first_guess(plan), place=rows.place)
+        assert alone[0] == pytest.approx(beside[n], rel=1e-12)
 
 
 def test_the_place_found_where_the_readout_is_unknown_is_the_least_of_all_sums_over_rows(make_plan: PlanMaker) -> None:

@@ -5,7 +5,7 @@ There is no list of loops and types: what these runs compile is kept for all lat
 
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -130,8 +130,9 @@ def _halve_one(clip: Path) -> None:
     some.plates[0].picture.halved()
 
 
-def _search_any_readout(clip: Path) -> None:
-    """Look for the strobe under every readout, as runs do where a plan's camera seems to be another."""
+def _search_otherwise(clip: Path) -> None:
+    """Look for the strobe under every readout, as runs do where a plan's camera seems to be another, and for LEDs that
+    are slow to go out."""
     from psvideo.sync.find import as_profiles
     from psvideo.sync.open_take import open_take
     from psvideo.sync.rowfit.coarse.search import search
@@ -141,7 +142,9 @@ def _search_any_readout(clip: Path) -> None:
     take = open_take(clip)
     seen = take_profiles(take)
     rows = as_profiles(take.plan, seen.index, seen.value, seen.doubt).one_window().binned(SEARCH_ROWS)
-    search(take.plan, rows, range_ppm=0.0, start=first_guess(take.plan), readout_known=False)
+    guess = first_guess(take.plan)
+    search(take.plan, rows, range_ppm=0.0, start=guess, readout_known=False)
+    search(take.plan, rows, range_ppm=0.0, start=replace(guess, fall_s=1e-4), readout_known=True)
 
 
 def _as_floats(frames: Path) -> None:
@@ -163,7 +166,7 @@ def run_small(take: SmallTake) -> None:
         clip = filmed(take, Path(folder))
         normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
         _halve_one(clip)
-        _search_any_readout(clip)
+        _search_otherwise(clip)
         if take.live:
             live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
 

@@ -17,8 +17,9 @@ from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import row_model
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.coarse.readout_kernel import least_over_readouts, losses_together
-from psvideo.sync.rowfit.coarse.search_kernel import losses_by_row
+from psvideo.sync.rowfit.coarse.readout_kernel import least_over_readouts
+from psvideo.sync.rowfit.coarse.search_kernel import losses_of_any, losses_of_square
+from psvideo.sync.rowfit.coarse.seen_shares import LANES
 from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
 
 ROBUST_STEEPNESS = 20.0
@@ -129,17 +130,30 @@ def losses(plan: Plan, rows: Profiles, clocks: TriedClocks, start: Beat, *, plac
     square = row_model.Flashes(train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1)
     flashes = square._replace(rise_s=start.rise_s, fall_s=start.fall_s)
     seen = compiled_rows(rows, start)._replace(row_place=place)
-    phase_s, rate = clocks.phase_s, 1.0 + clocks.offset_ppm * 1e-6
-    found = np.empty((len(phase_s), rows.value.shape[1]))
-    spread = rows.spread
-    plain = start.rise_s == start.fall_s == 0.0 and not start.beat_hz and rows.restless is None
-    run = losses_together if plain and not place.any() else losses_by_row
-    over_ranges(
-        lambda a, b: run(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
-        len(phase_s),
-        each=rows_of_a_part(rows.value.size),
-    )
+    found = np.empty((len(clocks.phase_s), rows.value.shape[1]))
+    _fill_losses(seen, flashes, clocks, rows.spread, found)
     return found
+
+
+def _fill_losses(
+    rows: row_model.Rows, flashes: row_model.Flashes, clocks: TriedClocks, spread: Doubles, found: Doubles
+) -> None:
+    phase_s, rate = clocks.phase_s, 1.0 + clocks.offset_ppm * 1e-6
+    count, each = len(phase_s), rows_of_a_part(rows.value.size)
+    if flashes.rise_s == flashes.fall_s == 0.0 and len(rows.beat_hz) == 0 and not rows.restless.any():
+        # clocks that are worked on together are those under which flashes come at nearly the same times
+        order = np.argsort(phase_s + rate * float(rows.frame_start_s.mean()), kind="stable")
+        over_ranges(
+            lambda a, b: losses_of_square(rows, flashes, phase_s, rate, order, spread, ROBUST_STEEPNESS, a, b, found),
+            count,
+            each=-(-each // LANES) * LANES,
+        )
+    else:
+        over_ranges(
+            lambda a, b: losses_of_any(rows, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
+            count,
+            each=each,
+        )
 
 
 def _over_readouts(
