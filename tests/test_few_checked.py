@@ -152,16 +152,11 @@ def test_angles_around_are_means_of_a_gaussian() -> None:
     np.testing.assert_allclose(lonely, 7, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("lights", "shade", "looked_at"),
-    [(3, glossy, False), (4, glossy, True), (5, matte, True), (5, glossy, False), (6, matte, False)],
-)
-def test_three_lights_leave_nothing_and_what_shines_under_five_or_six_is_solved_by_the_model(
-    lights: int, shade: Callable[[Array, Array], Array], looked_at: bool
-) -> None:
+@pytest.mark.parametrize(("lights", "looked_at"), [(3, False), (5, True), (6, False)])
+def test_three_lights_leave_nothing_and_six_are_solved_by_the_model(lights: int, looked_at: bool) -> None:
     normals, inside = ball()
     ways = ring(lights, 35)
-    found, one, _ = Solving(error=True).measured(shot(normals, ways, shade), under(ways), mask=inside)
+    found, one, _ = Solving(error=True).measured(shot(normals, ways, glossy), under(ways), mask=inside)
     assert (few_checked.turned_by_model_deg(found, 1, one, inside) is not None) == looked_at
     model = Reflectance(curve=0.0, rough=0.5, soft=0.0, broad=0.0, middle=0.0, narrow=0.0)
     by_model = replace(found, misfit=Misfit(share=0.01, error_deg=1.0, reflectance=model))

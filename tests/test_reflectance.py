@@ -97,24 +97,6 @@ def test_a_sheen_that_the_whole_subject_has_turns_no_normal(monkeypatch: pytest.
 
 
 FIVE = np.concatenate([ring(4, 45), ring(1, 10)])
-OTHER_FIVE = np.concatenate([ring(3, 50), ring(2, 25)])
-
-
-@pytest.mark.parametrize("ways", [FIVE, OTHER_FIVE], ids=["ring", "uneven"])
-@pytest.mark.parametrize("gloss", [0.05, 0.15, 0.4])
-def test_a_sheen_that_is_plain_under_five_lights_turns_no_normal(
-    monkeypatch: pytest.MonkeyPatch, ways: Array, gloss: float
-) -> None:
-    normals, sent = waves(), np.broadcast_to(ways[:, None, None], (len(ways), SIZE, SIZE, 3))
-    plates = shot(normals, sent, gloss=gloss)
-    found = Solving(error=True).solve(plates, under(ways))
-    off = off_deg(found.normals, normals)
-    assert found.error_deg is not None
-    assert (off <= 2 * found.error_deg).mean() > 0.9
-    without_model(monkeypatch)
-    before = Solving(error=True).solve(plates, under(ways))
-    assert off.mean() < 0.6 * off_deg(before.normals, normals).mean()
-    assert found.valid.mean() >= before.valid.mean()
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -24,11 +24,11 @@ from psvideo.model.surface import Reflectance
 Kind = Literal["shining", "rough", "soft"]
 LEAST_POINTS = 50
 FOR_SHINE = 6
-"""Five measurements leave two residuals, too few to tell a highlight from a normal unless it is plain (FEW_EXPLAIN)."""
+"""Five measurements leave two residuals: too few to tell a highlight from a normal. (A model that explains half
+would bring glossy subjects nearer, but leaves claims of three times the error, which fall with noise.)"""
 FEW_EXPLAIN = 0.5
-"""Of what five lights leave a model explains at least this share. Sheen, clay and plaster of virtual subjects explain
-0.8 to 1, the sheen of bear, cat, ball and bunny 0.5 to 0.95 under most sets. Under wrong lights sheen explains up to
-0.35 of a sphere (once of 24 sets 0.56), and roughness less than half of a matte sheet (once of 24 rigs more)."""
+"""Of what five lights leave a model explains at least this share. Clay and plaster of virtual subjects explain 0.8 to
+1; of a matte sheet under wrong lights roughness explains less than half (once of 24 rigs more)."""
 WELL_SPREAD = 3.0
 """Roughness shows in how lights from many sides differ: their directions' condition number is at most this."""
 LEAST_EXPLAINED = 0.1
@@ -122,8 +122,8 @@ class ModelFollowed(NamedTuple):
 
 def fitted(points: SubjectPoints) -> Reflectance | None:
     """Return the model that explains the points best, solved with their normals in turn; of fewer lights than FOR_SHINE
-    only one that plainly does. What is soft is looked for among the points that fit worst, too: before a wall that fits
-    most points are the wall's, and what the others leave counts as outliers."""
+    only a rough or soft one that plainly does. What is soft is looked for among the points that fit worst, too: before
+    a wall that fits most points are the wall's, and what the others leave counts as outliers."""
     found = _of_all(points)
     part = None if len(points.measured) < FOR_SHINE else _of_all(_worst_fitting(points))
     least_soft = 0.0 if found is None else SOFTER * found.soft
@@ -152,15 +152,12 @@ def _of_all(points: SubjectPoints) -> Reflectance | None:
     if len(g) < LEAST_POINTS:
         return None
     typical, few = median(sizes[known]), len(points.measured) < FOR_SHINE
-    best = alternated(points, g, typical)
-    least = FEW_EXPLAIN if few else LEAST_EXPLAINED
+    kind, best = "shining", alternated(points, g, typical)
     for other in _to_try(points):
         found = alternated(points, g, typical, other)
         if _leaves_less(found, best, other, few=few) and (other == "rough" or _faces_it(points, found.g, best.g)):
-            best = found
-        elif few and other == "soft" and _is_softer(found, best):
-            least = 1.0
-    if best.explained < least:
+            kind, best = other, found
+    if best.explained < (FEW_EXPLAIN if few else LEAST_EXPLAINED) or (few and kind == "shining"):
         return None
     of_albedo, lobes = best.model[:SHINE], best.model[SHINE:] * typical
     return Reflectance(*(float(each) for each in (*of_albedo, *lobes)))
@@ -177,11 +174,6 @@ def _leaves_less(found: ModelFollowed, before: ModelFollowed, kind: Literal["rou
     if kind == "rough":
         return bool(number >= LEAST_ROUGH and left < LESS_LEFT)
     return bool(LEAST_SOFT <= number < MOST_SOFT and left < (FEW_LEAVE if few else MUCH_LESS_LEFT))
-
-
-def _is_softer(found: ModelFollowed, before: ModelFollowed) -> bool:
-    """Return whether a soft model explains as much as another, so that few lights cannot tell them apart."""
-    return bool(found.model[SOFT] >= LEAST_SOFT and found.explained >= before.explained)
 
 
 def _faces_it(points: SubjectPoints, g: Doubles, before: Doubles) -> bool:
