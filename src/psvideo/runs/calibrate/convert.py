@@ -1,7 +1,7 @@
 """The whole of ``psvideo calibrate convert``: a rig in, the file of lights that another program reads out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psvideo.errors import UsageError
@@ -45,7 +45,10 @@ def convert(
         raise UsageError(f"`name`: {rig} names its lights itself. Leave it out, or change the names in that file.")
     if name:
         _check_names(Path(rig), name)
-    found = read_rig(Path(rig), plan_lights=tuple(name))
+    found = read_rig(Path(rig))
+    if name:
+        renamed = zip(found.lights, name, strict=True)
+        found = replace(found, lights=tuple(replace(light, name=own) for light, own in renamed))
     for sentence in write_rig(path, found):
         caller.warn(sentence)
     return ConvertedRig(rig=found, files=files)
@@ -55,10 +58,10 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
     """Raise UsageError where a list of lights is given another number of names, or writes some of these itself, which
     belong to the lights that it gives them to."""
     listed = read_rig(path).names
-    if len(listed) == len(names) and read_rig(path, plan_lights=names).names != tuple(names):
+    if any(name in listed and name != own for name, own in zip(names, listed, strict=False)):
         raise UsageError(
-            f"`name`: {path} names its lights itself ({', '.join(listed)}), some of them as here. Leave it out, or "
-            "give every light a name that stands nowhere in that list."
+            f"`name`: {path} names its lights itself ({', '.join(listed)}), and some of these names are given to other "
+            "lights here. Leave it out, or give every light its own name or a new one."
         )
     if len(listed) != len(names):
         raise UsageError(
