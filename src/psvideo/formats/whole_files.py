@@ -40,8 +40,10 @@ def check_can_be_written(path: Path) -> None:
         there = there.parent
     beside = _beside(there)
     try:
-        beside.touch()
+        beside.touch(exist_ok=False)
         beside.unlink()
+    except FileExistsError:  # this process is writing it already
+        return
     except OSError as fault:
         raise not_written(path, fault) from fault
 
