@@ -144,6 +144,15 @@ def test_one_normal_that_explains_more_than_three_plates_is_a_witness_and_of_thr
     assert checked(facing(1.0), under_axes(np.full((3, SIDE, SIDE), 0.3, np.float32))) is None
 
 
+def test_what_plates_leave_puzzles_less_where_repeats_show_noise_that_leaves_as_much() -> None:
+    plain = replace(facing(1.0), noise_deg=np.full((SIDE, SIDE), 1.0, np.float32))
+    noisy = replace(plain, noisier=np.full((SIDE, SIDE), 9.0, np.float32))
+    checks = [checked(points, under_five(0.3, 0.05)) for points in (plain, noisy)]
+    before, after = (check.puzzling.mean() for check in checks if check is not None)
+    assert before > 0.9
+    assert after < 0.75
+
+
 def test_what_looks_torn_is_a_crease_where_one_normal_explains_the_plates_of_five_lights() -> None:
     """A crease is narrow; throughout, nothing speaks for what is torn."""
     known, turned, torn = (np.full((SIDE, SIDE), value, np.float32) for value in (1.0, 0.6, 0.0))

@@ -1,6 +1,7 @@
 """Where nothing changed, normals differ by noise alone: they show how large it is that plates' finest detail hides."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -14,9 +15,12 @@ from psvideo.model.surface import Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
+from psvideo.solve.depth.view import View
 from psvideo.solve.instants import surfaces
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.repeats import MOST, PLAIN, SQUARE_PX, USUAL, Repeat, noise_times
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
+from psvideo.solve.normals.trust.torn import torn_angles_deg
 
 ROWS, COLS = 8 * SQUARE_PX, 10 * SQUARE_PX
 STANDS = np.ones((8, 10), np.bool_)
@@ -86,6 +90,17 @@ def test_noise_is_never_called_more_than_so_many_times_itself() -> None:
     times = noise_times(a_look(0, 50.0), a_look(1, 50.0), STANDS)
     assert times is not None
     np.testing.assert_array_equal(times, MOST**2)
+
+
+def test_normals_are_torn_by_no_more_than_the_noise_that_repeats_show() -> None:
+    shape, none = (ROWS, COLS), np.zeros((ROWS, COLS), np.float32)
+    look = a_look(0, 4 / HOLDS)
+    surface = Surface(normals=look.normals, albedo=np.ones(shape, np.float32), residual=None, valid=look.known)
+    points = ThinSurface(step=1, surface=surface, noise_deg=look.noise_deg, fit_deg=none, fit_of_noise_deg=none)
+    noisier = replace(points, noisier=np.full(shape, 16.0, np.float32))
+    before, after = (torn_angles_deg(one, none, none, View(), shape)[0] for one in (points, noisier))
+    assert np.median(before) > 0.5
+    assert np.median(after) == 0
 
 
 NAMES = ("a", "b", "c", "d", "e")

@@ -15,10 +15,10 @@ from psvideo.solve.normals.evidence import Indirect
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
 HELD = 0.68
-"""Errors that noise makes hold for this share of normals."""
+"""Predicted errors of noise hold for this share of normals."""
 PLAIN, USUAL = 0.91, 1.05
-"""Of plain noise so much of the predicted change holds for as many: 0.88 to 0.95 was seen without compression, the
-first in the middle; by chance, in a square, up to the second."""
+"""Without compression so many normals change by no more than the first of these times what is predicted (0.88 to 0.95
+was seen); in a square, by chance, by up to the second."""
 SQUARE_PX, ENOUGH, FEW = 12, 64, 10
 """Noise is looked at in squares of so many points, where so many of them stand still, if so many squares do."""
 CODED_WORSE = 0.8
