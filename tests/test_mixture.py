@@ -109,6 +109,7 @@ def test_parts_of_a_picture_are_those_of_the_whole(name: str) -> None:
     assert np.array_equal(picture.rows(range(3, 40, 5)), image[3:40:5])
     assert np.array_equal(picture.rows(np.array([9, 2, 30])), image[[9, 2, 30]])
     assert np.array_equal(picture.thinned(4), image[::4, ::4])
+    assert np.array_equal(picture.channel(1, range(0, 38, 5)), image[:38:5] if image.ndim == 2 else image[:38:5, :, 1])
     assert np.array_equal(picture.reader()(5, 12), image[5:12])
     grey = image.reshape(ROWS // 2, 2, COLS // 2, 2, -1).mean(axis=(1, 3, 4))
     assert np.abs(picture.halved() - grey).max() < 1e-6
@@ -149,6 +150,7 @@ def test_frames_in_files_give_the_same_picture(
     assert np.array_equal(there.image(), held.image())
     assert np.array_equal(there.rows(np.array([9, 2, 30])), held.rows(np.array([9, 2, 30])))
     assert np.array_equal(there.thinned(4), held.thinned(4))
+    assert np.array_equal(there.channel(1, range(0, 38, 5)), held.channel(1, range(0, 38, 5)))
     assert np.array_equal(there.halved(), held.halved())
 
 

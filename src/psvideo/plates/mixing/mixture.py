@@ -97,17 +97,30 @@ class Mixture:
         return image
 
     def thinned(self, stride: int) -> Image:
-        """Return every nth row and column of the picture."""
+        """Return every nth row and column of the picture; of each row one channel lies after the other."""
         if self.is_made:
             return self.image()[::stride, ::stride]
+        channels = int(np.prod(self.shape[2:]))
+        image = self._some(range(0, self.shape[0], stride), (0, channels), stride * channels)
         rows, cols = (-(-size // stride) for size in self.shape[:2])
-        image = np.empty((rows, cols, *self.shape[2:]), np.float32)
-        channels, bound = int(np.prod(self.shape[2:])), self.bound()
-        each = max(THINNED_SAMPLES // bound.mix.samples // stride, 1)
-        for first in range(0, rows, each):
-            last = min(first + each, rows)
-            some = range(stride * first, stride * (last - 1) + 1, stride)
-            bound.run(mix_thinned, some, first, last, stride, channels, image.reshape(rows, -1))
+        return np.moveaxis(image.reshape(rows, *self.shape[2:], cols), -1, 1)
+
+    def channel(self, number: int, rows: range) -> Image:
+        """Return one channel of the top row and of others at even distances, shape (row, col)."""
+        if self.is_made or len(self.shape) == 2:
+            some = self.rows(rows)
+            return np.ascontiguousarray(some if some.ndim == 2 else some[..., number])
+        return self._some(rows, (number, number + 1), self.shape[2])
+
+    def _some(self, rows: range, channels: tuple[int, int], stride: int) -> Image:
+        """Return of rows, the first of which is the top one, every nth sample of some channels, (row, sample)."""
+        bound = self.bound()
+        count = -(-bound.mix.samples // stride) * (channels[1] - channels[0])
+        image = np.empty((len(rows), count), np.float32)
+        each = max(THINNED_SAMPLES // bound.mix.samples // rows.step, 1)
+        for first in range(0, len(rows), each):
+            last = min(first + each, len(rows))
+            bound.run(mix_thinned, rows[first:last], first, last, rows.step, channels, stride, image)
         return image
 
     def halved(self) -> Image:

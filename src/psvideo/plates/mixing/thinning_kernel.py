@@ -16,17 +16,20 @@ ZERO, HALF = np.float32(0), np.float32(0.5)
 
 
 @FUSED.kept
-def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: int, out: Floats) -> None:
-    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample).
+def mix_thinned(
+    mix: MixtureArrays, first: int, last: int, step: int, channels: tuple[int, int], stride: int, out: Floats
+) -> None:
+    """Make every ``step``-th row, and of it every ``stride``-th sample from the first of each channel on: ``out``
+    (row, sample), one channel after the other.
 
-    ``first`` and ``last`` count rows of ``out``.
+    ``first`` and ``last`` count rows of ``out``, ``channels`` are the first one and the one after the last.
     """
     given, made = lent_mix(mix), lent(out)
     if given.zero.shape[2] > 1:  # what a sample means depends on its column
         whole = np.empty(given.samples, np.float32)
         for row in range(first, last):
             mix_row(given, step * row, whole)
-            _every(whole, made[row], step, channels)
+            _every(whole, made[row], channels, stride)
         return
     count = made.shape[1]
     codes = np.empty((given.frames.shape[0], count), given.like.dtype)
@@ -40,21 +43,26 @@ def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: 
         at = step * row
         for frame in range(given.frames.shape[0]):
             if given.coefficients[frame, at] != np.float32(0):
-                _every(row_of(given, frame, at), codes[frame], step, channels)
+                _every(row_of(given, frame, at), codes[frame], channels, stride)
             thin.frames[frame] = codes.ctypes.data + (frame - at) * count * codes.itemsize
         for level in range(given.levels.shape[0]):
             if given.taken[level, at] != np.float32(0):
-                _every(level_row(given, level, at), levels[level], step, channels)
+                _every(level_row(given, level, at), levels[level], channels, stride)
             thin.levels[level] = levels.ctypes.data + (level - at) * count * levels.itemsize
         mix_row(thin, at, made[row])
 
 
 @FUSED.inlined
-def _every(row: Any, out: Any, step: int, channels: int) -> None:
-    """Copy all channels of every ``step``-th pixel."""
-    for pixel in range(out.shape[0] // channels):
-        for channel in range(channels):
-            out[pixel * channels + channel] = row[pixel * step * channels + channel]
+def _every(row: Any, out: Any, channels: tuple[int, int], stride: int) -> None:
+    """Copy every ``stride``-th sample, one channel after the other."""
+    begin, end = channels
+    place = np.uint64(0)  # numbers without a sign: nothing is counted from the end
+    for channel in range(begin, end):
+        sample = np.uint64(channel)
+        for _ in range(out.shape[0] // (end - begin)):
+            out[place] = row[sample]
+            place += np.uint64(1)
+            sample += np.uint64(stride)
 
 
 @FUSED.kept

@@ -73,8 +73,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     step *= 2 if -(-cols // step) > WIDTH_PX else 1
     step = min(step, rows)
     chosen = range(0, rows - step + 1, step)  # few rows are made, and means taken along them
-    some = plate.picture.rows(chosen)
-    grey = np.ascontiguousarray(some if some.ndim == 2 else some[..., 1])
+    grey = plate.picture.channel(1, chosen)
     if step > 1:
         grey = np.asarray(cv2.resize(grey, (cols // step, len(grey)), interpolation=cv2.INTER_AREA), np.float32)
     white = white or min(max(1.2 * quantile(grey[::2, ::2], 0.995), 1e-3), plate.saturation)
@@ -98,12 +97,13 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     if (vague := vague_between(before.filled, after.filled)) is not None:
         after = replace(after, codes=np.where(vague, before.codes, after.codes))
     one, other = (picture.codes.astype(np.float32) for picture in (before, after))
-    changed = _changed(one, other)
-    still = Motion(speed_px_s=0.0, share=0.0)
-    if changed.mean() <= FEW_BLOCKS and (way_px := _shifted_px(one, other) * before.scale):
+    change = _change(one, other)
+    changed = _changed(change)
+    share, still = np.count_nonzero(changed) / changed.size, Motion(speed_px_s=0.0, share=0.0)
+    if share <= FEW_BLOCKS and (way_px := _shifted_px(one, other, change) * before.scale):
         speed_px_s = way_px / abs(after.time_s - before.time_s)
         return Motion(speed_px_s=speed_px_s, share=1.0, changed=np.ones_like(changed))
-    if changed.mean() <= LEAST_BLOCKS:
+    if share <= LEAST_BLOCKS:
         return still
     search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     forward, backward = (
@@ -112,34 +112,33 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     returns = changed & _returns(forward, backward)
     followed = returns & _explained(one, other, forward)
     if followed.sum() < FOLLOWED * changed.sum():
-        return Motion(speed_px_s=None, share=float(changed.mean()), changed=_well_within(changed))
+        return Motion(speed_px_s=None, share=share, changed=_well_within(changed))
     way = np.hypot(forward[..., 0], forward[..., 1])[followed] * before.scale
     speed = quantile(way, FASTEST) / abs(after.time_s - before.time_s)
     return Motion(speed_px_s=speed, share=float(returns.mean()), changed=_well_within(changed))
 
 
-def _changed(one: Floats, other: Floats) -> NDArray[np.bool_]:
-    """Return where two pictures differ by more than noise, (row, col). A change of all light by one factor is none."""
-    change = _change(one, other)
+def _changed(change: Floats) -> NDArray[np.bool_]:
+    """Return where the change from one picture to another is more than noise, (row, col)."""
     mean = cv2.blur(change, (3, 3))
-    noise = 1.4826 * median(np.abs(change - mean)[::2, ::2]) * np.sqrt(9 / 8)
+    noise = 1.4826 * median(np.abs(change[::2, ::2] - mean[::2, ::2])) * np.sqrt(9 / 8)
     squares = cv2.blur(mean * mean, (8, 8))
     local = np.sqrt(np.maximum(squares, 0))  # running sums may leave a little less than nothing
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))
 
 
 def _change(one: Floats, other: Floats) -> Floats:
-    """Return by how much pictures differ beside one factor of all light."""
+    """Return by how much pictures differ beside one factor of all light, whose change is none."""
     early, late = one[::2, ::2], other[::2, ::2]  # medians of a quarter are as good
     bright = early > 30
     level = median(late[bright] / early[bright]) if bright.any() else 1.0
     return np.asarray(other - one * np.float32(level), np.float32)
 
 
-def _shifted_px(one: Floats, other: Floats) -> float:
+def _shifted_px(one: Floats, other: Floats, change: Floats) -> float:
     """Return by how much a picture shifted as a whole, 0 where it did not: fine detail that goes by everywhere looks
     like noise, but neighbours go by together, and one shift brings it back."""
-    change = _change(one, other)[::2]
+    change = change[::2]
     size = max(float(np.mean(change * change, dtype=np.float64)), 1e-12)
     if abs(float(np.mean(change[:, 1:] * change[:, :-1], dtype=np.float64))) < WHITE * size:
         return 0.0

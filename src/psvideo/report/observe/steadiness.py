@@ -58,7 +58,7 @@ def change(before: Sample, after: Sample) -> Change | None:
         return None
     some = np.flatnonzero(rest)
     some = some[:: max(len(some) // ENOUGH, 1)]
-    one, other = (sample.normals.reshape(3, -1)[:, some] for sample in (before, after))
+    one, other = (np.take(sample.normals.reshape(3, -1), some, axis=1) for sample in (before, after))
     relative = after.albedo.ravel()[some] / before.albedo.ravel()[some] - 1
     return Change(
         normals_deg=median(_angle_deg(one, other)),
@@ -81,5 +81,6 @@ def _points_alike(one: Floats, other: Floats) -> NDArray[np.bool_]:
 
 def _angle_deg(one: Floats, other: Floats) -> NDArray[np.float64]:
     """Return the angles between vectors (3, place) of any length; exact for small ones."""
-    across = np.sqrt((np.cross(one, other, axis=0) ** 2).sum(axis=0))
-    return np.asarray(np.rad2deg(np.arctan2(across, (one * other).sum(axis=0))), np.float64)
+    (x, y, z), (u, v, w) = one, other  # np.cross and sums over three planes take four times as long
+    across = np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
+    return np.asarray(np.rad2deg(np.arctan2(across, x * u + y * v + z * w)), np.float64)
