@@ -9,6 +9,7 @@ import pytest
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.trust.indirect import not_of_motion
 from psvideo.solve.normals.trust.judging import Judging
 from psvideo.solve.normals.trust.moving_doubt import (
     MOST_DEG,
@@ -167,6 +168,45 @@ def test_what_looks_torn_is_a_crease_where_one_normal_explains_the_plates_of_fiv
     assert doubt(puzzled_by(0.0)) >= none_torn - 0.2
     torn[:] = 9.0
     assert doubt(puzzled_by(0.0)) > 10
+
+
+def test_what_is_torn_around_a_narrow_thing_says_little_of_it_where_one_normal_explains_its_plates() -> None:
+    known, turned, torn = (np.full((SIDE, SIDE), value, np.float32) for value in (1.0, 0.6, 9.0))
+    torn[:, 47:50] = 1.0
+
+    def doubt(check: Checked | None) -> float:
+        return float(moving_doubt_deg(turned, torn, known, check=check)[48, 48])
+
+    none_torn = float(moving_doubt_deg(turned, np.zeros_like(torn), known)[48, 48])
+    assert doubt(None) > none_torn + 5, "three lights fit by chance"
+    assert doubt(puzzled_by(0.2)) == pytest.approx(doubt(None), abs=0.5)
+    assert doubt(puzzled_by(0.0)) == pytest.approx(none_torn, abs=0.2)
+
+
+def turned_to_the_right() -> tuple[ThinSurface, Evidence]:
+    """A wall that two of five lamps pass by."""
+    points, one = facing(1.0), under_five(0.0, 0.0)
+    points.surface.normals[:] = (0.9, 0, math.sqrt(1 - 0.9**2))
+    return points, one
+
+
+def test_light_from_lamps_that_pass_a_face_by_is_of_motion_as_far_as_their_plates_are_unsure() -> None:
+    points, one = turned_to_the_right()
+    passing = one.lit.directions @ points.surface.normals[0, 0] < 0.05
+    assert passing.sum() == 2
+    sums = np.full((SIDE, SIDE), 0.2, np.float32)
+
+    def left(lamps: np.ndarray, unsure: float) -> np.ndarray:
+        plates = np.zeros((LIGHTS, SIDE // 2, SIDE // 2), np.float32)
+        plates[lamps] = unsure
+        return np.asarray(not_of_motion(points, replace(one, unsure=plates), sums), np.float32)
+
+    for unsure, rest in ((0.0, 0.2), (0.02, 0.12), (1e4, 0.0)):
+        np.testing.assert_allclose(left(passing, unsure), rest, atol=1e-6)
+    np.testing.assert_array_equal(left(~passing, 1e4), sums, "plates of lamps that light it")
+    np.testing.assert_array_equal(not_of_motion(points, one, sums), sums, "nothing moves")
+    sums = -sums
+    np.testing.assert_array_equal(left(passing, 1.0), sums, "noise")
 
 
 def test_normals_on_either_side_of_what_moves_are_torn_and_say_little_where_plates_agree() -> None:

@@ -3,8 +3,10 @@ unsure, looked for while a solver has the rows: reading plates again would cost 
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
+from psvideo.model.arrays import Floats
 from psvideo.model.surface import Reflectance
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.evidence import Evidence, Indirect, Left
@@ -12,6 +14,10 @@ from psvideo.solve.normals.light_sigmas import combined_noise, with_noise
 from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Result, Task, Work, task
+from psvideo.solve.normals.trust.thin_surface import ThinSurface
+
+OF_MOTION = np.float32(2)
+"""Light up to so many times what is unsure of a plate may be of motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,3 +63,19 @@ class IndirectLook:
         indirect_rows(
             given, work, planes, albedo, *self.found, *self.left, np.float32(self.soft), first, last, self.step
         )
+
+
+def not_of_motion(points: ThinSurface, one: Evidence, sums: Floats) -> Floats:
+    """Return what reaches points from lamps that do not, ``Indirect.sums``, less what motion may have made of it: the
+    blend of a face before and after it turned away from a lamp shows light there that came by way of no surface."""
+    from psvideo.solve.normals.trust.indirect_kernel import FACING
+
+    if one.unsure is None or not one.moved:
+        return sums
+    size, off = np.maximum(points.brightness, np.float32(1e-6)), np.zeros_like(sums)
+    strengths = one.lit.intensities.mean(axis=1).astype(np.float32)
+    for toward, strength, plane in zip(one.lit.directions.astype(np.float32), strengths, one.unsure, strict=True):
+        unsure = cv2.resize(plane, off.shape[::-1], interpolation=cv2.INTER_LINEAR) / (size * strength)
+        passes_by = np.tensordot(toward, points.planes, 1) <= FACING
+        off += np.minimum(OF_MOTION * unsure, 1) * passes_by
+    return np.asarray(np.minimum(sums, np.maximum(sums - off, 0)), np.float32)

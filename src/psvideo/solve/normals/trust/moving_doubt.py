@@ -45,6 +45,9 @@ class MovingDoubt:
         motion, turning a normal by less than such an angle: normals of two surfaces are torn anyway.
     torn_around, least_around_deg, torn_around_deg: and of its mean over a square of such a share, beyond the first, the
         square over the second: what is wrong throughout (blades, a checker) is hardly torn in the middle of a facet.
+    torn_itself_deg: where one normal explains the plates of more than three lights, that mean counts only as far as the
+        point is torn itself, wholly where it is by so much beyond ``least_torn_deg``: rods and posts are narrower than
+        what is around them, of which their outlines are torn.
     near, stirring_deg, stirring_share: all of that where anything stirs: motion turns at least such a share of a square
         so wide by more than such an angle, or is followed there.
     most_deg: no more is claimed. Where plates are not explained at all, a normal is one that some of them show, and
@@ -67,6 +70,7 @@ class MovingDoubt:
     least_around_deg: float = 2.0
     torn_around: float = 0.15
     torn_around_deg: float = 2.0
+    torn_itself_deg: float = 6.0
     near: float = 0.3
     stirring_deg: float = 0.5
     stirring_share: float = 0.02
@@ -198,11 +202,13 @@ def _torn_doubt(
     around = cv2.blur(torn_deg * known, size) / np.maximum(cv2.blur(known, size), np.float32(1e-6))
     own = np.maximum(torn_deg - np.float32(how.least_torn_deg), 0)
     around = np.maximum(around - np.float32(how.least_around_deg), 0)
+    around *= around / np.float32(how.torn_around_deg)
+    if check is not None:
+        around *= np.maximum(check.puzzling, np.minimum(own / np.float32(how.torn_itself_deg), 1))
+        own *= check.puzzling
     agreed = _on_outline(moves) & (turned_deg < how.agreed_deg)
     own *= np.where(agreed, np.float32(how.outline), 1)
-    if check is not None:
-        own *= check.puzzling
-    apart = np.float32(how.torn) * own + around * around / np.float32(how.torn_around_deg)
+    apart = np.float32(how.torn) * own + around
     return np.asarray(apart * np.minimum(stirs / np.float32(how.stirring_share), 1), np.float32)
 
 

@@ -25,6 +25,7 @@ from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_length import by_length_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
+from psvideo.solve.normals.trust.indirect import not_of_motion
 from psvideo.solve.normals.trust.lit_shadows import LitShadows, shadows_of
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
@@ -231,12 +232,13 @@ def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
     alike for a vector, of which what lies across the normal turns it."""
     from psvideo.solve.normals.trust.signs_kernel import fill_indirect_deg
 
-    both = np.stack(seen[:2])
+    sums = not_of_motion(points, one, seen.sums)
+    both = np.stack([sums, seen.counts])
     near, far = (blurred(both, width).reshape(2, -1) for width in points.widths)
     added = (np.linalg.pinv(one.lit.directions) @ np.ones(len(one.plates))).astype(np.float32)
     turned = np.empty(points.known.shape, np.float32)
     fill_indirect_deg(
-        points.planes.reshape(3, -1), line(seen.sums), line(seen.counts), near, far, line(points.noise_deg), added,
+        points.planes.reshape(3, -1), line(sums), line(seen.counts), near, far, line(points.noise_deg), added,
         LEAST_UNREACHED, line(turned),
     )  # fmt: skip
     return turned
