@@ -156,7 +156,7 @@ def slot_unknowns(plan: Plan) -> Integers:
 def compiled_rows(rows: Profiles, beat: Beat) -> row_model.Rows:
     """Return the profiles as compiled code takes them."""
     return row_model.Rows(
-        rows.value,
+        np.ascontiguousarray(rows.value),  # as all others: loops read them without their references
         rows.frame_start_s,
         rows.place,
         beat.row_time_s,
@@ -226,6 +226,7 @@ def equations(
     """
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     honest, growth = steepness is not None, weight if steepness is None else steepness
+    weight, growth = np.ascontiguousarray(weight), np.ascontiguousarray(growth)
     rest = np.empty_like(rows.value)
     place = np.zeros(rest.shape if honest else (0, 0), np.int64)
     if honest:

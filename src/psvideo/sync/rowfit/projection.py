@@ -4,17 +4,48 @@ The derivatives of the model (``row_model``) are projected on what the brightnes
 explain (Kaufman 1975). That gives the normal equations of a Gauss-Newton step in one pass.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
+from psvideo.compute.memory import lent
 from psvideo.model.arrays import Doubles
 from psvideo.sync.rowfit.kernel import fit_window, solve_factored
-from psvideo.sync.rowfit.row_model import BLUR, LEFT, RIGHT, RISE, SIGNALS, Flashes, Rows, given_off, see, slopes, width
+from psvideo.sync.rowfit.row_model import (
+    BLUR,
+    LEFT,
+    RIGHT,
+    RISE,
+    SIGNALS,
+    Flashes,
+    Rows,
+    given_off,
+    lent_flashes,
+    lent_rows,
+    see,
+    slopes,
+    width,
+)
 from psvideo.sync.rowfit.unknowns.whitening import factors, whiten, whiten_all
 
 MOST_LEVERAGE = 0.9
 """A sample that its brightness fits all by itself says nothing of errors; its residual is not blown up without end."""
+
+
+class _Room(NamedTuple):
+    """Arrays that one call works in."""
+
+    design: Doubles
+    first_flash: NDArray[np.int64]
+    normal: Doubles
+    right: Doubles
+    signals: Doubles
+    cross: Doubles
+    solved: Doubles
+    diagonal: Doubles
+    below: Doubles
 
 
 @EXACT.called
@@ -103,15 +134,39 @@ def equations(
     but in robust fits. Where ``honest``, residuals count in the scores as large as if no brightness had been fitted to
     them (MacKinnon and White 1985, HC2).
     """
-    frames = len(rows.value)
-    size = width(rows, flashes)
-    design = np.empty((frames, size))
-    first_flash = np.empty(frames, np.int64)
-    normal, right = np.empty((size, size)), np.empty(size)
-    signals = np.empty((frames, SIGNALS))
-    cross = np.empty((SIGNALS, size))
-    solved = np.empty(size)
-    diagonal, below = np.empty(frames), np.empty(frames)
+    frames, size = len(rows.value), width(rows, flashes)
+    own = _Room(
+        np.empty((frames, size)), np.empty(frames, np.int64), np.empty((size, size)), np.empty(size),
+        np.empty((frames, SIGNALS)), np.empty((SIGNALS, size)), np.empty(size), np.empty(frames), np.empty(frames),
+    )  # fmt: skip
+    _add_rows(rows, flashes, weight, steepness, tails, honest, first, last, rest, hessian, score, place, at_place, own)
+
+
+@EXACT.called
+def _add_rows(
+    rows: Rows,
+    flashes: Flashes,
+    weight: Doubles,
+    steepness: Doubles,
+    tails: bool,
+    honest: bool,
+    first: int,
+    last: int,
+    rest: Doubles,
+    hessian: Doubles,
+    score: Doubles,
+    place: NDArray[np.int64],
+    at_place: Doubles,
+    room: _Room,
+) -> None:
+    """Do what ``equations`` does, with its arrays lent: their references would be counted for every sample."""
+    rows, flashes = lent_rows(rows), lent_flashes(flashes)
+    weight, steepness, rest, place = lent(weight), lent(steepness), lent(rest), lent(place)
+    hessian, score, at_place = lent(hessian), lent(score), lent(at_place)
+    design, first_flash, normal, right = lent(room.design), lent(room.first_flash), lent(room.normal), lent(room.right)
+    signals, cross, solved = lent(room.signals), lent(room.cross), lent(room.solved)
+    diagonal, below = lent(room.diagonal), lent(room.below)
+    frames, size = design.shape
     used = SIGNALS if tails and flashes.blur_s > 0.0 else BLUR if tails else RISE  # the others are 0 everywhere
     for row in range(first, last):
         k = 0

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from psvideo.compute.compiled import EXACT
+from psvideo.compute.memory import lent
 from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.rows.shutter import REACH
 
@@ -59,6 +60,24 @@ class Flashes(NamedTuple):
     """The standard deviation by which rows are blurred, as a time;"""
     row_s: float = 0.0
     """and the time from one row to the next."""
+
+
+@EXACT.inlined
+def lent_rows(rows: Rows) -> Rows:
+    """The same without reference counts, which every call for a sample would count up and down."""
+    return Rows(
+        lent(rows.value), lent(rows.frame_start_s), lent(rows.row_place), rows.row_time_s, rows.exposure_s,
+        lent(rows.bounds), lent(rows.ends_s), lent(rows.beat_hz), lent(rows.restless),
+    )  # fmt: skip
+
+
+@EXACT.inlined
+def lent_flashes(flashes: Flashes) -> Flashes:
+    """The same without reference counts."""
+    return Flashes(
+        lent(flashes.start_s), lent(flashes.duration_s), lent(flashes.unknown), flashes.unknowns, flashes.rise_s,
+        flashes.fall_s, flashes.blur_s, flashes.row_s,
+    )  # fmt: skip
 
 
 @EXACT.kept
@@ -179,6 +198,7 @@ def see_all(rows: Rows, flashes: Flashes, row: int, design: Doubles) -> None:
     if flashes.rise_s == 0.0 and flashes.fall_s == 0.0 and flashes.blur_s == 0.0 and len(rows.beat_hz) == 0:
         _see_sharp(rows.frame_start_s, rows.row_place[row] * rows.row_time_s, rows.exposure_s, flashes, design)
         return
+    rows, flashes, design = lent_rows(rows), lent_flashes(flashes), lent(design)
     k = 0
     for n in range(len(design)):
         k = see(rows, flashes, n, row, k, design[n])

@@ -16,7 +16,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
 from psvideo.sync.rowfit.refine import LAST_SCALE, Fit, robust_loss
-from psvideo.sync.rowfit.row_model import Flashes, Rows, seen_of
+from psvideo.sync.rowfit.row_model import Flashes, Rows, lent_flashes, lent_rows, seen_of
 
 SPLIT = 0.3
 """Each of two frames must have seen this much of a flash before what they say across its parts counts."""
@@ -72,6 +72,7 @@ def _variance(samples: Doubles) -> float:
 @EXACT.kept
 def _parts(rows: Rows, flashes: Flashes, rest: Doubles, whole: Doubles, split: Doubles) -> None:
     """Fill in (frame, row) the residuals of frames that saw a whole flash, and those across a flash that two saw."""
+    rows, flashes = lent_rows(rows), lent_flashes(flashes)
     frames, height = rest.shape
     for row in range(height):
         k = 0

@@ -7,12 +7,13 @@ saw. Flashes touch neighbouring frames only, so that its Cholesky factor has a d
 from psvideo.compute.compiled import EXACT
 from psvideo.model.arrays import Doubles
 from psvideo.model.rows.shutter import REACH
-from psvideo.sync.rowfit.row_model import Flashes, Rows, seen_of
+from psvideo.sync.rowfit.row_model import Flashes, Rows, lent_flashes, lent_rows, seen_of
 
 
 @EXACT.kept
 def factors(rows: Rows, flashes: Flashes, row: int, diagonal: Doubles, below: Doubles) -> None:
     """Fill a row's Cholesky factor, ``diagonal`` and ``below`` it, (frame,) each; windows are independent."""
+    rows, flashes = lent_rows(rows), lent_flashes(flashes)
     tail_s = REACH * flashes.fall_s
     k = window = 0
     for n in range(len(rows.value)):
