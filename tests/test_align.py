@@ -107,6 +107,7 @@ def test_a_scene_at_rest_stays_as_it_is(lights: int, noise: float) -> None:
     assert told_forced > 0.99 * said
 
 
+@pytest.mark.campaign
 def test_what_the_subject_hides_of_the_wall_is_right_or_not_valid() -> None:
     clip = noiseless(8, "4 px", WIDER)
     one = brought(clip)[1]

@@ -45,6 +45,7 @@ def test_the_first_and_the_last_round_have_one_side_only(which: int) -> None:
         ("4 px", Aligning(rate="flash"), 2.0, 1.25),  # two rounds packed, and an instant
     ],
 )
+@pytest.mark.campaign
 def test_no_more_plates_are_held_than_instants_need(
     motion: str, how: Aligning, per_light: float, later: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -107,6 +107,7 @@ def test_what_is_no_matte_sphere_is_refused_light_by_light() -> None:
     assert all("not matte" in light.fault or "no matte sphere" in light.fault for light in found)
 
 
+@pytest.mark.campaign
 def test_a_real_matte_sphere_agrees_with_the_chrome_one(
     shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

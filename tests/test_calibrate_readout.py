@@ -142,6 +142,7 @@ def test_no_readout_is_read_into_a_scene(shared_data: Path, scene: str) -> None:
     ],
     ids=str,
 )
+@pytest.mark.campaign
 def test_the_period_is_found_for_any_duty_exposure_curve_and_noise(kind: dict[str, float]) -> None:
     rng = np.random.default_rng(5)
     options: dict[str, Any] = {"rows": ROWS, "period": 40.3, **kind}

@@ -47,6 +47,7 @@ def test_a_plan_is_the_same_when_it_is_read_back(request_words: ShootWords) -> N
 
 @given(ANY_REQUEST)
 @settings(max_examples=150, deadline=None)
+@pytest.mark.campaign
 def test_no_row_can_hold_two_flashes_with_both_clocks_at_their_worst(request_words: ShootWords) -> None:
     plan = plan_shoot(parse_request(request_words)).plan
     camera_ppm = request_words.camera_clock_ppm

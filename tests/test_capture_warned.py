@@ -204,6 +204,7 @@ def test_a_slow_camera_that_only_films_long_is_not_said_to_be_in_step() -> None:
 
 
 @pytest.mark.parametrize(("drift", "said"), [(0.0, "however long the take"), (20e-6, "in a take of 10 s")])
+@pytest.mark.campaign
 def test_a_strobe_that_slowly_drifts_is_in_step_for_a_take_and_not_for_ever(drift: float, said: str) -> None:
     dark = f"{9 * (1 + drift)}ms"
     shoot = planned(shutter=180.0, flash="1ms", dark=dark, marker="none")

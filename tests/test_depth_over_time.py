@@ -86,6 +86,7 @@ def bust(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Surface]:
     return seen
 
 
+@pytest.mark.campaign
 def test_in_a_clip_that_stands_still_nothing_wanders_and_no_instant_depends_on_another(
     bust: Callable[[int], Surface],
 ) -> None:

@@ -208,7 +208,14 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 SLOW = {"how_frames", "how_plates", "how_normals", "gallery_depth", "depth_bust", "rolling_fan"}
-SLOW |= {"fault_colour_shift", "fault_wrong_curve"}
+SLOW |= {
+    "fault_banding",
+    "fault_colour_shift",
+    "fault_dropped_frame",
+    "fault_flicker",
+    "fault_led_tails",
+    "fault_wrong_curve",
+}
 """The campaign's: other figures are made in the same way."""
 
 

@@ -54,6 +54,7 @@ def errors_and_claims(plan: Plan, clock: TrueClock) -> Doubles:
 
 
 @pytest.mark.parametrize("run", RUNS)
+@pytest.mark.campaign
 def test_the_error_of_the_followed_clock_is_what_it_claims(make_plan: PlanMaker, run: str) -> None:
     plan = make_plan(width_px=8, height_px=96)
     clocks = [TrueClock(phase_s=0.0037 * (seed + 1), seed=seed, **RUNS[run]) for seed in range(3)]

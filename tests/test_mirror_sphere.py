@@ -223,6 +223,7 @@ def test_a_matte_sphere_is_refused_with_what_to_do() -> None:
 
 
 @pytest.mark.parametrize(("lights", "lit", "refused"), [(4, 2, True), (4, 3, False), (3, 1, True), (2, 1, False)])
+@pytest.mark.campaign
 def test_a_sphere_on_which_few_of_the_lights_show_gives_no_rig(lights: int, lit: int, refused: bool) -> None:
     lamps = {name: lamp if n < lit else OFF for n, (name, lamp) in enumerate(list(DISTANT.items())[:lights])}
     sightings = sight_spheres([shoot(Lens(width=300, height=300), [ball_at(0)], lamps)], Looking(), where="ball")
@@ -275,6 +276,7 @@ def test_the_psbox_sphere_with_its_hand_made_circle(psbox: Path, tmp_path: Path)
     assert (errors < 2 * own).all()
 
 
+@pytest.mark.campaign
 def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_are_owned(
     psbox: Path, psbox_measured: MirrorCalibration
 ) -> None:
@@ -318,6 +320,7 @@ def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(
 
 
 @pytest.mark.parametrize("wrong", [(0, 44, 0), (0, 0, -40)])
+@pytest.mark.campaign
 def test_a_circle_that_the_picture_contradicts_is_named_and_costs_its_error(
     psbox: Path, tmp_path: Path, wrong: tuple[float, float, float]
 ) -> None:

@@ -212,6 +212,7 @@ def measured_badly(rng: np.random.Generator, rig: Rig, error_deg: float) -> Rig:
 @pytest.mark.parametrize(
     ("kind", "least_right"), [("random", 12), ("uneven", 8), ("strengths", 8), ("nearly", 0), ("regular", 0)]
 )
+@pytest.mark.campaign
 def test_over_many_rigs_and_scenes_no_order_is_ever_wrong(kind: str, least_right: int, make_plan: PlanMaker) -> None:
     rng = np.random.default_rng(7)
     right = 0

@@ -92,6 +92,7 @@ def glossy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(ps.shoot(folder / "scene.toml", folder / "clip").path)
 
 
+@pytest.mark.campaign
 def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_first_noted(
     glossy: Path, tmp_path: Path
 ) -> None:

@@ -139,6 +139,7 @@ def test_every_edge_is_in_its_clock_cycle_over_back_to_back_cycles(name: str) ->
 
 
 @pytest.mark.parametrize("seed", range(12))
+@pytest.mark.campaign
 def test_edges_of_random_cycles_are_too(seed: int) -> None:
     dice = random.Random(seed)
     cycle = [replace(random_slot(dice, 0), dark=400) for _ in range(3)]
@@ -149,6 +150,7 @@ def test_edges_of_random_cycles_are_too(seed: int) -> None:
 
 @pytest.mark.parametrize("trims", [[(20_000, 2)], [(-20_000, 3)], [(777, 2), (-12_345, 5), (0, 9)]])
 @pytest.mark.parametrize("name", ["one line after the other", "a last burst that is cut", "full power beside bursts"])
+@pytest.mark.campaign
 def test_both_groups_make_every_edge_in_its_clock_cycle_over_trims(name: str, trims: list[tuple[int, int]]) -> None:
     cycle, rounds = CYCLES[name] * 2, 8
     assert any(extras(cycle, rounds, trims))

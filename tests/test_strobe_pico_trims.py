@@ -285,6 +285,7 @@ def test_a_group_that_does_not_read_where_the_clock_says_is_dark_at_once(group: 
 
 @pytest.mark.parametrize("longest_ms", [2, 8, 60, 400])
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.campaign
 def test_the_groups_stay_in_step_or_it_is_dark_wherever_the_program_is_held_up(seed: int, longest_ms: int) -> None:
     dice = random.Random(seed)
     pico = Pico()

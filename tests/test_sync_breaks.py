@@ -81,6 +81,7 @@ def off_rows(plan: Plan, timing: Timing, fired: tuple[TrueFlash, ...], frames: i
         pytest.param(6, 1.0, 0.42, 56, 16.25, 18.81, 515, id="one-dead-flash"),
     ],
 )
+@pytest.mark.campaign
 def test_flashes_beside_a_break_are_complete_only_where_they_fired(
     lights: int,
     shutter: float,
@@ -109,6 +110,7 @@ def test_flashes_beside_a_break_are_complete_only_where_they_fired(
     ],
 )
 @pytest.mark.parametrize("rest", [-0.6, 0.0, 0.04, 0.15])
+@pytest.mark.campaign
 def test_a_strobe_that_moves_by_many_frames_and_a_little_started_again(
     rest: float,
     lights: int,

@@ -115,6 +115,7 @@ def test_bends_add_up_and_run_straight_on_beyond_the_last_knot() -> None:
 
 
 @pytest.mark.parametrize(("true", "planned"), [(1.0, 0.99), (0.97, 1.0), (0.5, 0.515)])
+@pytest.mark.campaign
 def test_an_exposure_that_is_off_by_more_than_a_flash_lasts_is_found(
     true: float, planned: float, make_plan: PlanMaker
 ) -> None:

@@ -40,6 +40,7 @@ def test_flickering_ambient_light_is_separated_from_the_strobe(hz: float, make_p
     assert timing_of(plan, shoot(plan, ambient=0.15)).mains is None
 
 
+@pytest.mark.campaign
 def test_mains_that_run_a_little_fast_are_followed_through_the_clip(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6, fps=Fraction(90))
     timing = timing_of(plan, shoot(plan, frames=240, ambient=0.15, mains=MainsSwing(hz=100.15, depth=0.8)))
@@ -153,6 +154,7 @@ def test_everything_at_once_is_borne(make_plan: PlanMaker) -> None:
     assert timing.dropped_frames == (DroppedFrames(after=119, count=1),)
 
 
+@pytest.mark.campaign
 def test_rows_that_saturate_count_for_less(plan: Plan) -> None:
     shot = shoot(plan, scene=plates(plan, bright=2.2), frames=96)
     share = (shot.frames >= 0.998).mean(axis=2)
@@ -200,6 +202,7 @@ def test_flicker_alone_is_no_strobe(make_plan: PlanMaker) -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.campaign
 def test_tails_that_compressed_rows_hide_count_in_the_claim_where_the_exposure_differs_too(
     make_plan: PlanMaker, seed: int
 ) -> None:

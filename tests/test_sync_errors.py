@@ -58,6 +58,7 @@ def test_an_unknown_that_rows_do_not_determine_is_not_known_at_all() -> None:
     assert standard_error_of(-1e-20) == np.inf
 
 
+@pytest.mark.campaign
 def test_what_black_cuts_off_noise_adds_to_rows_that_saw_little_is_in_the_error(make_plan: PlanMaker) -> None:
     """Where a file's black cuts off noise, dark rows are too bright: opening and closing edges err, each in its way."""
     plan = make_plan(height_px=96, width_px=64, shutter=0.5, readout=0.65, duration_s=6e-4, lights=tuple("abcdef"))
@@ -77,6 +78,7 @@ def test_what_black_cuts_off_noise_adds_to_rows_that_saw_little_is_in_the_error(
 
 
 @pytest.mark.parametrize(("power", "nominal"), [(1.02, 1.0), (0.98, 1.0), (0.98, 1.0003)])
+@pytest.mark.campaign
 def test_a_curve_that_is_two_percent_off_is_no_other_exposure(
     power: float, nominal: float, make_plan: PlanMaker
 ) -> None:

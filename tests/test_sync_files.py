@@ -61,6 +61,7 @@ def rms_rows(timing: Timing, shot: Exposure, plan: Plan) -> float:
 
 
 @pytest.mark.parametrize(("ppm", "shutter"), [(-5000.0, 0.5), (30.0, 1.0)])
+@pytest.mark.campaign
 def test_compression_is_not_taken_for_slow_leds(
     ppm: float, shutter: float, make_plan: PlanMaker, tmp_path: Path
 ) -> None:
@@ -83,12 +84,14 @@ def test_blurred_edges_are_taken_for_no_other_time(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("seed", "crf", "shutter"), [(5067, 14, 0.75), (5075, 17, 0.25), (5088, 11, 0.75)])
+@pytest.mark.campaign
 def test_edges_that_a_blur_softens_a_little_put_the_times_in_doubt(seed: int, crf: int, shutter: float) -> None:
     offset_ppm = 30.0 if seed == 5075 else 2000.0
     outcome = tried(Trial(seed=seed, crf=crf, preset="veryfast", shutter=shutter, offset_ppm=offset_ppm))
     assert 0.4 * outcome.claimed_rows < outcome.made_rows < 2 * outcome.claimed_rows
 
 
+@pytest.mark.campaign
 def test_tails_that_compression_could_feign_are_in_doubt_where_they_are_taken() -> None:
     trial = Trial(seed=6006, crf=19, preset="ultrafast", shutter=0.5, offset_ppm=-5000.0, tails_rows=0.6)
     outcome = tried(trial)

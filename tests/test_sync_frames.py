@@ -75,6 +75,7 @@ def test_a_frame_that_another_stands_in_for_is_repeated_and_missing(plan: Plan) 
 @pytest.mark.parametrize("margin", [1.29, 1.3])
 @pytest.mark.parametrize("readout", [-1.0, 1.0])
 @pytest.mark.parametrize("lost", [True, False])
+@pytest.mark.campaign
 def test_a_frame_that_looks_like_the_one_before_it_because_another_is_missing_is_not_repeated(
     make_plan: PlanMaker, margin: float, readout: float, *, lost: bool
 ) -> None:

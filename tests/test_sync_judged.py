@@ -345,6 +345,7 @@ def test_lamps_that_flicker_are_named_where_highlights_clip(plan: Plan) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.campaign
 def test_lamps_that_flicker_are_not_taken_for_a_camera_whose_gain_changes(
     plan: Plan, seed: int, *, backwards: bool
 ) -> None:
@@ -367,6 +368,7 @@ def test_lamps_that_flicker_are_not_taken_for_a_camera_whose_gain_changes(
     ],
 )
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.campaign
 def test_light_that_was_read_by_another_curve_shows_where_a_row_splits_a_flash(
     plan: Plan, read: Callable[[np.ndarray], np.ndarray], least: float, most: float, seed: int
 ) -> None:
@@ -386,6 +388,7 @@ def test_light_that_was_read_by_another_curve_shows_where_a_row_splits_a_flash(
     ],
 )
 @pytest.mark.parametrize("degrees", [90.0, 180.0])
+@pytest.mark.campaign
 def test_below_360_degrees_times_are_right_too_where_light_was_read_by_another_curve(
     plan: Plan, read: Callable[[np.ndarray], np.ndarray], least: float, most: float, degrees: float
 ) -> None:
@@ -420,6 +423,7 @@ def test_slow_leds_put_times_in_doubt_where_light_was_read_by_another_curve(
     assert timing.phase_error_s < timing.row_time_s
 
 
+@pytest.mark.campaign
 def test_another_camera_that_leaves_times_unsure_is_none(make_plan: PlanMaker) -> None:
     """Footage that was turned by 90 degrees looks like a global shutter's: flashes of 1.9 ms were 1.2 ms off."""
     made = make_plan(
@@ -507,6 +511,7 @@ def first_start_s(timing: Timing, plan: Plan) -> float:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("options", [{}, {"rise_s": 1e-4, "fall_s": 2e-4}, {"ambient": 0.1}, {"ppm": 400.0}])
+@pytest.mark.campaign
 def test_light_that_was_read_rightly_adds_up_under_slow_leds_and_room_light_too(
     plan: Plan, options: dict[str, float], seed: int
 ) -> None:
@@ -657,6 +662,7 @@ def test_flashes_that_either_end_of_an_exposure_may_cut_are_refused(
 @pytest.mark.parametrize(
     ("seed", "slip", "missing", "unique"), [(3, 0.6, 33, False), (4, 0.3, 33, False), (2, 0.3, 74, True)]
 )
+@pytest.mark.campaign
 def test_a_strobe_nearly_in_step_with_a_rolling_shutter_is_timed_rightly_or_refused(
     seed: int, slip: float, missing: int, unique: bool, make_plan: PlanMaker
 ) -> None:

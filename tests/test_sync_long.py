@@ -59,6 +59,7 @@ def means(shot: Exposure) -> Doubles:
 
 
 @pytest.mark.usefixtures("little_is_long")
+@pytest.mark.campaign
 def test_a_clock_that_drifts_is_followed_through_frames_that_the_first_fit_left_out(plan: Plan) -> None:
     shot = drifting(plan, Noise(full_well_e=100, read_e=20))
     timing = timed(plan, shot, means(shot))

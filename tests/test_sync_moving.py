@@ -49,6 +49,7 @@ def test_slow_leds_show_on_a_subject_that_tumbles_with_everything_else_unknown()
 
 
 @pytest.mark.parametrize(("tail_rows", "seed"), [(0.09, 0), (0.09, 1), (0.35, 3)])
+@pytest.mark.campaign
 def test_tails_that_the_plan_does_not_tell_are_found_or_claimed_before_a_subject_that_tumbles(
     tail_rows: float, seed: int
 ) -> None:

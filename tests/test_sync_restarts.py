@@ -170,6 +170,7 @@ def test_thirty_frames_that_are_missing_are_one_hole(plan: Plan) -> None:
     assert sum("as if 30 frames were missing" in note and "may look the same" in note for note in timing.notes) == 1
 
 
+@pytest.mark.campaign
 def test_where_the_strobe_seems_to_start_again_missing_frames_are_named_too(plan: Plan) -> None:
     keep = np.delete(np.arange(170), np.arange(60, 110))
     profiles = shot_of(plan, frames=170).frames.mean(axis=2, dtype=np.float64)[keep]
@@ -295,6 +296,7 @@ def test_frames_show_a_strobe_at_any_place_in_its_cycle_or_none(plan: Plan) -> N
 
 
 @pytest.mark.parametrize("cut", [40, 88])
+@pytest.mark.campaign
 def test_a_clock_that_jumps_by_little_shows_in_the_error_and_is_told(cut: int, plan: Plan) -> None:
     shots, profiles = with_restart(plan, -0.03 * plan.cycle_s / len(plan.cycle_slots), cut=cut)
     timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
@@ -346,6 +348,7 @@ def test_parts_between_which_frames_are_missing_are_one_strobe(plan: Plan, monke
 
 
 @pytest.mark.parametrize("share", [0.05, 0.37, 1.0, 2.6])
+@pytest.mark.campaign
 def test_parts_of_a_strobe_that_began_anew_are_not_one(share: float, plan: Plan) -> None:
     _, profiles = with_restart(plan, share * plan.cycle_s / len(plan.cycle_slots))
     rows = rows_of(plan, profiles)
@@ -354,6 +357,7 @@ def test_parts_of_a_strobe_that_began_anew_are_not_one(share: float, plan: Plan)
 
 
 @pytest.mark.parametrize("late", [0.8, 3.3, 4.6])
+@pytest.mark.campaign
 def test_a_strobe_that_paused_before_a_global_shutter_is_timed_or_refused(make_plan: PlanMaker, late: float) -> None:
     """Frames show little more than which flash they saw: 29 missing frames explained a pause, with wrong names."""
     plan = make_plan(height_px=48, width_px=12, readout=0.0, lights=("key", "left", "right", "top"))

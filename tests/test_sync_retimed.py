@@ -179,6 +179,7 @@ def test_frames_missing_all_over_without_a_pattern_are_found(plan: Plan) -> None
 @pytest.mark.parametrize("count", [1, 2])
 @pytest.mark.parametrize("gone", [1, 2])
 @pytest.mark.parametrize("end", ["first", "last"])
+@pytest.mark.campaign
 def test_a_hole_beside_the_very_last_or_first_frames_is_found(end: str, gone: int, count: int, plan: Plan) -> None:
     shown = np.arange(FRAMES)
     shown[-count if end == "last" else count :] += gone

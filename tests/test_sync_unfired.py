@@ -99,6 +99,7 @@ def test_between_dark_slots_the_missing_flashes_of_one_light_or_two_are_no_hole(
 
 
 @pytest.mark.parametrize(("readout", "dead"), [(0.35, 6), (0.5, 5)])
+@pytest.mark.campaign
 def test_several_missing_flashes_of_lights_that_pulse_are_no_hole_and_no_other_strobe(
     readout: float, dead: int, make_plan: PlanMaker
 ) -> None:
