@@ -42,6 +42,30 @@ def test_an_outline_is_drawn_by_the_light_of_single_pixels() -> None:
     assert np.mean(apart[beside] > 5) < 0.01, "a third, where distances are those of squares of pixels"
 
 
+def ball_before_wall(u: Array, v: Array) -> Array:
+    """A ball of 0.3 m before a wall."""
+    ways, radius_m = rays(u, v), 0.15
+    along, size = FAR_M + radius_m, (ways**2).sum(axis=-1)
+    inside = along**2 - size * (along**2 - radius_m**2)
+    return np.where(inside > 0, (along - np.sqrt(np.maximum(inside, 0))) / size, 1.4 * FAR_M)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_rim_of_a_ball_that_few_lights_reach_stands_on_the_ball(seed: int) -> None:
+    """Two lights or three say nothing of the rim's distance: it goes with the surface that no edge parts it from."""
+    points, normals = surface(ball_before_wall)
+    rig = ring_rig(5, 2)
+    plates = filmed(rig, points, normals)
+    reach = np.sum([plate > 0.003 for plate in plates], axis=0)
+    rim = (points[..., 2] > -1.2 * FAR_M) & (reach == 3) & (normals[..., 2] > 0.25)
+    rng = np.random.default_rng(seed)
+    noisy = [plate + rng.normal(0, 0.001, plate.shape).astype(np.float32) for plate in plates]
+    found = ps.solve_images(np.stack(noisy), rig)
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    assert np.mean(apart[rim] > 5) < 0.05, "a quarter, where what nothing tells is as far as the wall"
+    assert found.valid[rim].mean() > 0.4, "a tenth, where it is in doubt as far as that"
+
+
 def test_noise_turns_normals_by_the_light_that_their_place_gets() -> None:
     rig = ring_rig(8, 2)
     depth_m = np.full((SIZE, SIZE), FAR_M, np.float32)

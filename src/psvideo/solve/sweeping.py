@@ -69,8 +69,11 @@ def swept(
     if found.on_plane:
         return replace(near, ground=replace(near.ground, unsure=found.unsure))
     closer, farther = (for_pixels(side, each * fine, (rows, cols))[::fine, ::fine] for side in sides_of(found.depth_m))
-    drawn, torn = outlined(near.ground, lights, light, (closer, farther), step=fine, noise=dark)
-    unsure = np.maximum(cv2.resize(found.unsure, torn.shape[::-1], interpolation=cv2.INTER_LINEAR), torn)
+    known = for_pixels(found.reached.view(np.uint8), each * fine, (rows, cols))[::fine, ::fine] > 0
+    unsure = for_pixels(found.unsure, each * fine, (rows, cols))[::fine, ::fine]
+    drawn, unsure = outlined(
+        near.ground, lights, light, (closer, farther), step=fine, noise=dark, known=known, unsure=unsure
+    )
     ground = replace(near.ground, unsure=unsure)
     depth_m = for_pixels(drawn, fine, (rows, cols))
     apart = for_pixels(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
@@ -80,11 +83,12 @@ def swept(
 
 @dataclass(frozen=True, kw_only=True)
 class Distances:
-    """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, and whether
-    all of the surface stands on the plane."""
+    """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, which
+    of them enough lights ``reached``, and whether all of the surface stands on the plane."""
 
     depth_m: NDArray[np.float32]
     unsure: NDArray[np.float32]
+    reached: NDArray[np.bool_]
     on_plane: bool
 
 
@@ -103,7 +107,7 @@ def _distances(
     unsure = _unsure(costs, len(lights), np.log(deep / plane_m), reached)
     beside = cv2.dilate(unsure * reached, np.ones((AROUND, AROUND), np.uint8))
     unsure = np.where(reached, unsure, np.maximum(unsure, beside))  # in shadow it may be any surface around
-    return Distances(depth_m=deep, unsure=unsure, on_plane=on_plane)
+    return Distances(depth_m=deep, unsure=unsure, reached=reached, on_plane=on_plane)
 
 
 def _unsure(
