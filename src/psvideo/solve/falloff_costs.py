@@ -16,6 +16,8 @@ from psvideo.solve.normals.plate_noise import LEAST
 from psvideo.solve.normals.task import Samples
 
 Plates = Sequence[Samples] | Sequence[Mixture]
+LEAST_LIT = 4
+"""Four lights leave one number over for the distance."""
 OWN_SHARE = 0.005
 """What surfaces are off by from the model where nothing is wrong."""
 
@@ -57,12 +59,13 @@ def for_pixels(points: NDArray[Any], count: int, shape: tuple[int, int]) -> NDAr
 
 def falloff_costs(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], depth_m: NDArray[np.float64],
-    ratios: NDArray[np.float64], *, at: NDArray[np.bool_], step: int, noise: float,
+    ratios: NDArray[np.float64], *, at: NDArray[np.bool_], step: int, noise: float, least_lit: int = LEAST_LIT,
 ) -> NDArray[np.float64]:  # fmt: skip
     """Return for the points of ``at``, row by row, how badly ``depth_m`` times each ratio explains their light.
 
     ``light`` (row, col, light), ``depth_m`` and ``at`` (row, col) hold every ``step``-th row and column; noise is that
-    of dark light. Shape (ratio, point): about 1 where a distance explains it, 0 where too few lights reach a point.
+    of dark light. Shape (ratio, point): about 1 where a distance explains it, 0 where fewer lights than ``least_lit``,
+    and not all, reach a point.
     """
     from psvideo.solve.sweeping_kernel import sweep_points
 
@@ -74,8 +77,8 @@ def falloff_costs(
     lamps = np.stack([np.array(strengths), field.anisotropy, field.is_near.astype(np.float64)], axis=-1)
     costs = np.empty((len(ratios), int(at.sum())))
     sweep_points(
-        light[at], rays[at], depth_m[at], ratios, field.positions_m, field.axes, lamps, max(noise, LEAST), OWN_SHARE,
-        costs,
+        light[at], rays[at], depth_m[at], ratios, field.positions_m, field.axes, lamps,
+        min(least_lit, len(lights)), max(noise, LEAST), OWN_SHARE, costs,
     )  # fmt: skip
     return costs
 

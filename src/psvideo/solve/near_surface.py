@@ -26,6 +26,8 @@ ROUGH_PX = 480
 """Depth for the lights' sake is integrated on a picture of at most this many pixels along its longer side."""
 MOST_OFF = 0.12
 """Integrated depth that is off by more than this share of what the lights' falloff says is not believed."""
+OF_PART = 1.5
+"""A distance is at most so many times as unsure as half of its part are."""
 LEAST_COVERED = 0.5
 """Share of a rough pixel's normals that must be there."""
 
@@ -36,6 +38,8 @@ class NearSurface:
 
     known_m: the depth (row, col) known of the instant with a number, 0 where unknown; it comes before the ground's.
     apart: (row, col), pixels through which no surface runs, so that what lies beside them is integrated by itself.
+    torn: how far off the logarithm of distances may be because pixels may belong to another surface, (row, col) as
+        what the ground is unsure of.
     """
 
     ground: Ground
@@ -43,6 +47,7 @@ class NearSurface:
     iterations: int = 0
     known_m: Callable[[int], NDArray[np.float32]] | None = None
     apart: NDArray[np.bool_] | None = None
+    torn: NDArray[np.float32] | None = None
 
     def at(self, number: int) -> "NearSurface":
         """Return where the surface is at the instant with this number."""
@@ -91,9 +96,26 @@ def solve_near(
             swept_m = near.ground.depth_m
             depth_m[np.abs(depth_m - swept_m) > MOST_OFF * swept_m] = 0
             ground = near.ground
-        ground = ground.with_depth(depth_m)
+        ground = _held_by_parts(ground, depth_m, near).with_depth(depth_m)
         surface = solve(light(ground))
     return surface
+
+
+def _held_by_parts(ground: Ground, depth_m: NDArray[np.float32], near: NearSurface) -> Ground:
+    """Return the ground with distances that are hardly more unsure than most of their part are: the relief of a part is
+    integrated, and only the distance of the whole is left to find."""
+    if ground.unsure is None:
+        return ground
+    rows, cols = (np.arange(size) * full // size for size, full in zip(ground.unsure.shape, depth_m.shape, strict=True))
+    whole = depth_m > 0 if near.apart is None else (depth_m > 0) & ~near.apart
+    count, parts = cv2.connectedComponents(whole[np.ix_(rows, cols)].view(np.uint8), connectivity=4)
+    in_order = ground.unsure.ravel()[np.lexsort((ground.unsure.ravel(), parts.ravel()))]
+    many = np.bincount(parts.ravel(), minlength=count)
+    of_part = OF_PART * in_order[np.minimum(np.cumsum(many) - many + many // 2, in_order.size - 1)]
+    of_part[0] = np.inf
+    unsure = np.minimum(ground.unsure, of_part[parts])
+    unsure = unsure if near.torn is None else np.maximum(unsure, near.torn)
+    return replace(ground, unsure=np.asarray(unsure, np.float32))
 
 
 def _cut(surface: Surface, apart: NDArray[np.bool_]) -> Surface:

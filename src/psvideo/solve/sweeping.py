@@ -71,14 +71,14 @@ def swept(
     closer, farther = (for_pixels(side, each * fine, (rows, cols))[::fine, ::fine] for side in sides_of(found.depth_m))
     known = for_pixels(found.reached.view(np.uint8), each * fine, (rows, cols))[::fine, ::fine] > 0
     unsure = for_pixels(found.unsure, each * fine, (rows, cols))[::fine, ::fine]
-    drawn, unsure = outlined(
+    drawn, unsure, torn = outlined(
         near.ground, lights, light, (closer, farther), step=fine, noise=dark, known=known, unsure=unsure
     )
-    ground = replace(near.ground, unsure=unsure)
+    ground = replace(near.ground, unsure=np.maximum(unsure, torn))
     depth_m = for_pixels(drawn, fine, (rows, cols))
     apart = for_pixels(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
     shaping = replace(near.shaping, known_m=depth_m)
-    return replace(near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart)
+    return replace(near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart, torn=torn)
 
 
 @dataclass(frozen=True, kw_only=True)

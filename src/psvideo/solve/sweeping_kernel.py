@@ -8,20 +8,21 @@ from psvideo.model.irradiance.near_light import LEAST_COSINE
 
 ROUNDS = 4
 """Of weighing down what does not fit."""
-LEAST_LIT, TINY = 4, 1e-12
+TINY = 1e-12
 
 
 @FUSED.kept
 def sweep_points(
     light: Doubles, rays: Doubles, plane_m: Doubles, ratios: Doubles, positions: Doubles, axes: Doubles,
-    lamps: Doubles, noise: float, own: float, costs: Doubles,
+    lamps: Doubles, least_lit: int, noise: float, own: float, costs: Doubles,
 ) -> None:  # fmt: skip
     """Fill ``costs`` (ratio, point): the mean of log(1 + r^2) over the lights that reach a point, r what the best
     normal leaves of their light in units of its error; 0 where too few do.
 
     light: (point, light), below 0 where it is not known. rays: (point, 3), to depth 1. plane_m: (point,), the depth of
     ratio 1. positions: (light, 3), in metres, or a distant light's direction. lamps: (light, 3): intensity, anisotropy,
-    and 1 for a near light. noise: of dark light; own: what else a point's brightest light is off by, as a share.
+    and 1 for a near light. least_lit: how many lights must reach a point. noise: of dark light; own: what else a
+    point's brightest light is off by, as a share.
     """
     points, lights = light.shape
     vectors, weight, left = np.zeros((lights, 3)), np.zeros(lights), np.zeros(lights)
@@ -30,7 +31,7 @@ def sweep_points(
         for k in range(lights):
             lit += light[point, k] > 6 * noise
             most = max(most, light[point, k])
-        if lit < LEAST_LIT:
+        if lit < least_lit:
             costs[:, point] = 0.0
             continue
         off = np.sqrt(noise * noise + own * own * most * most)

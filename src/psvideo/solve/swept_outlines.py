@@ -14,7 +14,7 @@ from psvideo.model.arrays import Floats, Mask
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
 from psvideo.solve.falloff_costs import falloff_costs
-from psvideo.solve.nearest_surfaces import FAR, nearest_surfaces
+from psvideo.solve.nearest_surfaces import FAR, Places, nearest_surfaces
 
 FINE_POINTS = 960
 """Points along the picture's longer side."""
@@ -24,6 +24,8 @@ APART = 1.04
 """Sides that differ by less are one."""
 AROUND = 5
 """What single pixels say is averaged over a disc of this many, less at its rim."""
+LEAST_LIT = 5
+"""What single pixels show counts where so many lights reach them, or all: by four a rim is taken for what it is not."""
 SURELY = 4.0
 """A point is surely on one side where the logarithm of the odds is beyond this."""
 EVEN = 3
@@ -31,6 +33,9 @@ EVEN = 3
 EDGE_ODDS, MOST_ODDS = 4.0, np.float32(4)
 """What edges say of the odds: so much for light that changes wholly between a point and the other surface, and never
 more than the second."""
+CLOSE, STRANGE = np.float32(0.4), np.float32(0.8)
+"""Where a way is no longer than the first, no edge parts a point from a surface; from which every way is longer than
+the second, that more likely belongs to one of which nothing is known."""
 
 
 def sides_of(deep: Floats) -> tuple[Floats, Floats]:
@@ -42,21 +47,40 @@ def sides_of(deep: Floats) -> tuple[Floats, Floats]:
 def outlined(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], sides: tuple[Floats, Floats], *, step: int,
     noise: float, known: Mask, unsure: Floats,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Return the depth (row, col) of every ``step``-th row and column, and how unsure its logarithm is.
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Return the depth (row, col) of every ``step``-th row and column, how unsure its logarithm is, and how far off it
+    may be because points may belong to the other surface.
 
     Of the two ``sides`` that is taken which explains the ``light`` (row, col, light) of the point and its neighbours
-    better; their mean where they are one. Where that tells nothing, or distances are not ``known``, a point stands on
-    the surface that is reached across the least edges. ``unsure``: of the distances.
+    better; their mean where they are one. Where that tells little, or distances are not ``known``, it stands on the
+    surface that is reached across the least edges, if both ``sides`` are reached. ``unsure``: of the distances.
     """
     near_m, far_m = sides
-    beside = far_m > APART * near_m
-    between, nearer = np.sqrt(near_m * far_m), _nearer(ground, lights, light, sides, beside, step=step, noise=noise)
+    beside, between = far_m > APART * near_m, np.sqrt(near_m * far_m)
+    nearer = _nearer(ground, lights, light, sides, beside, step=step, noise=noise)
     depth_m = np.where(beside, np.where(nearer > 0, near_m, far_m), between).astype(np.float32)
+    torn = np.where(beside, _torn(np.log(far_m / near_m), nearer), np.float32(0)).astype(np.float32)
     seeds = known & (~beside | (np.abs(nearer) > SURELY))
     if seeds.all() or not seeds.any():
-        return depth_m, unsure
-    return _across_least_edges(light, depth_m, seeds, nearer, unsure, least=noise)
+        return depth_m, unsure, torn
+    firsts, ways = _across_least_edges(light, depth_m, seeds, least=noise)
+    logs, places = np.log(depth_m).ravel(), np.arange(seeds.size).reshape(seeds.shape)
+    first, second = (np.where(one >= 0, one, places) for one in firsts)
+    second = np.where(firsts[1] >= 0, second, first)
+    these = ~beside | (ways[0] < CLOSE)  # or both sides are reached
+    these |= (logs[first] - np.log(between)) * (logs[second] - np.log(between)) < 0
+    gap = logs[second] - logs[first]
+    odds = np.minimum(np.float32(EDGE_ODDS) * (ways[1] - ways[0]), MOST_ODDS) + np.sign(gap) * nearer
+    taken = np.where(seeds | ~these, places, np.where(odds >= 0, first, second))
+    neither = unsure / (1 + np.exp(np.clip(np.float32(EDGE_ODDS) * (STRANGE - ways[0]), -40, 40)))
+    across = np.where(these, np.maximum(_torn(gap, odds), neither), torn)
+    torn = np.where(seeds, torn, across).astype(np.float32)
+    return depth_m.ravel()[taken], unsure.ravel()[taken], torn
+
+
+def _torn(gap: Floats, odds: Floats) -> Floats:
+    """Return the standard deviation of what is one or, beyond a ``gap``, the other, by the logarithm of the odds."""
+    return np.asarray(np.abs(gap) / (2 * np.cosh(np.clip(odds / 2, -40, 40))), np.float32)
 
 
 def _nearer(
@@ -69,7 +93,17 @@ def _nearer(
     if not beside.any():
         return nearer
     near, far = (
-        falloff_costs(ground, lights, light, side.astype(np.float64), np.ones(1), at=beside, step=step, noise=noise)[0]
+        falloff_costs(
+            ground,
+            lights,
+            light,
+            side.astype(np.float64),
+            np.ones(1),
+            at=beside,
+            step=step,
+            noise=noise,
+            least_lit=LEAST_LIT,
+        )[0]
         for side in sides
     )
     nearer[beside] = far - near
@@ -78,24 +112,14 @@ def _nearer(
 
 
 def _across_least_edges(
-    light: NDArray[np.float64], depth_m: Floats, known: Mask, nearer: Floats, unsure: Floats, *, least: float
-) -> tuple[Floats, Floats]:
-    """Return depth and how unsure it is where points that are not ``known`` stand on one of the two surfaces that are
-    reached from them across the least edges: on the nearest, unless what they show themselves is against it."""
-    shape = known.shape
-    places = np.arange(known.size, dtype=np.int32).reshape(shape)
-    seeds = np.stack([np.where(known, places, -1), np.full(shape, -1)]).astype(np.int32)
+    light: NDArray[np.float64], depth_m: Floats, known: Mask, *, least: float
+) -> tuple[Places, Floats]:
+    """Return for every point the places of the two surfaces that are reached across the least edges, (2, row, col), -1
+    where there is none, and the ways to them."""
+    places = np.arange(known.size, dtype=np.int32).reshape(known.shape)
+    seeds = np.stack([np.where(known, places, -1), np.full(known.shape, -1)]).astype(np.int32)
     ways = np.where(seeds >= 0, np.float32(0), FAR)
-    even = np.stack(
-        [cv2.GaussianBlur(plane, (EVEN, EVEN), 0) for plane in np.moveaxis(light.astype(np.float32), -1, 0)], axis=-1
-    )
+    planes = np.moveaxis(light.astype(np.float32), -1, 0)
+    even = np.stack([cv2.GaussianBlur(plane, (EVEN, EVEN), 0) for plane in planes], axis=-1)
     nearest_surfaces(even, depth_m, least, float(np.log(APART)), seeds, ways)
-    first, second = (np.where(one >= 0, one, places) for one in seeds)
-    second = np.where(seeds[1] >= 0, second, first)
-    logs = np.log(depth_m).ravel()
-    gap = logs[second] - logs[first]
-    odds = np.minimum(np.float32(EDGE_ODDS) * (ways[1] - ways[0]), MOST_ODDS) + np.sign(gap) * nearer
-    taken = np.where(odds >= 0, first, second)
-    torn = np.abs(gap) / (2 * np.cosh(np.clip(odds / 2, -40, 40)))
-    found = np.where(known, depth_m, depth_m.ravel()[taken]).astype(np.float32)
-    return found, np.where(known, unsure, np.maximum(unsure.ravel()[taken], torn)).astype(np.float32)
+    return seeds, ways

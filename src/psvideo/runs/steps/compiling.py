@@ -91,6 +91,7 @@ def solve_small() -> None:
 
     for one in PICTURES:
         solve_images(one.images, one.rig)
+    _draw_an_outline()
 
 
 def compile_ahead(*, watch: Watch = unwatched) -> None:
@@ -145,6 +146,14 @@ def _search_otherwise(clip: Path) -> None:
     guess = first_guess(take.plan)
     search(take.plan, rows, range_ppm=0.0, start=guess, readout_known=False)
     search(take.plan, rows, range_ppm=0.0, start=replace(guess, fall_s=1e-4), readout_known=True)
+
+
+def _draw_an_outline() -> None:
+    """Draw an outline of one point, as runs do where near lights find a wall behind their subject."""
+    from psvideo.solve.nearest_surfaces import FAR, nearest_surfaces
+
+    unknown, ways = np.full((2, 1, 1), -1, np.int32), np.full((2, 1, 1), FAR)
+    nearest_surfaces(np.ones((1, 1, 1), np.float32), np.ones((1, 1), np.float32), 0.0, 0.0, unknown, ways)
 
 
 def _as_floats(frames: Path) -> None:
