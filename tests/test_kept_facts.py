@@ -60,7 +60,7 @@ def test_facts_come_out_as_they_went_in_each_by_itself_and_in_turn(lights: int) 
 
 def test_a_round_takes_no_more_than_its_numbers() -> None:
     """Rounds of one take share the value at which their plates clip, and what their subject reflects."""
-    seed, numbers, measured = random.Random(1), range(4000), []
+    seed, numbers = random.Random(1), range(4000)
     white, reflectance = (1.0, 1.0, 1.0, 1.0), Reflectance(0.1, 0.0, 0.0, 0.0, 0.2, 0.0)
 
     def filmed(number: int) -> InstantFacts:
@@ -70,12 +70,15 @@ def test_a_round_takes_no_more_than_its_numbers() -> None:
         whole = replace(_facts(number, seed), levels=levels, clipped=clipped, change=change, misfit=misfit)
         return replace(whole, white=tuple(one + 0.0 for one in white), valid_share=seed.random(), ambient=seed.random())
 
-    places: tuple[list[InstantFacts] | KeptFacts, ...] = ([], KeptFacts())
-    for kept in places:
+    def taken_by(kept: list[InstantFacts] | KeptFacts) -> float:
         tracemalloc.start()
         for number in numbers:
             kept.append(filmed(number))
-        measured.append(tracemalloc.get_traced_memory()[0] / len(numbers))
+        taken = tracemalloc.get_traced_memory()[0] / len(numbers)
         tracemalloc.stop()
-    assert measured[0] > RECORD_BYTES
-    assert measured[1] < MOST_BYTES
+        return taken
+
+    # the least of three: what a thread of another test allocates meanwhile counts too
+    records, numbers_alone = taken_by([]), min(taken_by(KeptFacts()) for _ in range(3))
+    assert records > RECORD_BYTES
+    assert numbers_alone < MOST_BYTES
