@@ -98,3 +98,17 @@ def test_light_that_is_unknown_is_no_edge() -> None:
     known[:, 0] = True
     _, ways = found(light, np.ones((ROWS, COLS), np.float32), known)
     np.testing.assert_allclose(ways[0], np.broadcast_to(STEP * np.arange(COLS), (ROWS, COLS)), atol=1e-6)
+
+
+@given(seed=st.integers(0, 10_000))
+def test_the_second_surface_is_always_another_than_the_first(seed: int) -> None:
+    """Distances that drift from seed to seed: what was another surface may be that of a nearer seed."""
+    rng = np.random.default_rng(seed)
+    light = rng.uniform(0.3, 0.7, (ROWS, COLS, 3)).astype(np.float32)
+    known = rng.random((ROWS, COLS)) < 0.15
+    known[0, 0] = True
+    depth_m = np.exp(rng.uniform(0, 0.12, (ROWS, COLS))).astype(np.float32)
+    seeds, _ = found(light, depth_m, known)
+    two = seeds[1] >= 0
+    logs = np.log(depth_m).ravel()
+    assert np.all(np.abs(logs[seeds[0][two]] - logs[seeds[1][two]]) >= APART - 1e-6)

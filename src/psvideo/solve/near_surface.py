@@ -27,7 +27,7 @@ ROUGH_PX = 480
 MOST_OFF = 0.12
 """Integrated depth that is off by more than this share of what the lights' falloff says is not believed."""
 OF_PART = 1.5
-"""A distance is at most so many times as unsure as half of its part are."""
+"""A distance is at most so many times as unsure as the median of its part."""
 LEAST_COVERED = 0.5
 """Share of a rough pixel's normals that must be there."""
 
@@ -102,8 +102,8 @@ def solve_near(
 
 
 def _held_by_parts(ground: Ground, depth_m: NDArray[np.float32], near: NearSurface) -> Ground:
-    """Return the ground with distances that are hardly more unsure than most of their part are: the relief of a part is
-    integrated, and only the distance of the whole is left to find."""
+    """Return the ground with distances that are hardly more unsure than the median of their part: the relief of a part
+    is integrated, and only the distance of the whole is left to find."""
     if ground.unsure is None:
         return ground
     rows, cols = (np.arange(size) * full // size for size, full in zip(ground.unsure.shape, depth_m.shape, strict=True))

@@ -31,11 +31,11 @@ SURELY = 4.0
 EVEN = 3
 """Edges are looked for in light that is averaged over so many points: noise is none."""
 EDGE_ODDS, MOST_ODDS = 4.0, np.float32(4)
-"""What edges say of the odds: so much for light that changes wholly between a point and the other surface, and never
-more than the second."""
+"""What it says of the odds that one way is longer than the other: so much of their logarithm for light that changes
+wholly, and at most the second."""
 CLOSE, STRANGE = np.float32(0.4), np.float32(0.8)
-"""Where a way is no longer than the first, no edge parts a point from a surface; from which every way is longer than
-the second, that more likely belongs to one of which nothing is known."""
+"""A way that is shorter than the first crosses no strong edge. A point all of whose ways are longer than the second
+more likely belongs to a surface of which nothing is known."""
 
 
 def sides_of(deep: Floats) -> tuple[Floats, Floats]:
@@ -53,7 +53,8 @@ def outlined(
 
     Of the two ``sides`` that is taken which explains the ``light`` (row, col, light) of the point and its neighbours
     better; their mean where they are one. Where that tells little, or distances are not ``known``, it stands on the
-    surface that is reached across the least edges, if both ``sides`` are reached. ``unsure``: of the distances.
+    surface that is reached across the least edges, if no strong one lies between or both ``sides`` are reached.
+    ``unsure``: of the distances.
     """
     near_m, far_m = sides
     beside, between = far_m > APART * near_m, np.sqrt(near_m * far_m)
@@ -92,17 +93,10 @@ def _nearer(
     nearer = np.zeros(beside.shape, np.float32)
     if not beside.any():
         return nearer
+    one = np.ones(1)
     near, far = (
         falloff_costs(
-            ground,
-            lights,
-            light,
-            side.astype(np.float64),
-            np.ones(1),
-            at=beside,
-            step=step,
-            noise=noise,
-            least_lit=LEAST_LIT,
+            ground, lights, light, side.astype(np.float64), one, at=beside, step=step, noise=noise, least_lit=LEAST_LIT
         )[0]
         for side in sides
     )
