@@ -28,13 +28,14 @@ from psvideo.model.irradiance.near_light import near_field, near_vectors
 from psvideo.model.rig import Light, Rig
 from psvideo.solve import near_surface
 from psvideo.solve.depth import Shaping, View
-from psvideo.solve.falloff_costs import around, for_pixels
+from psvideo.solve.falloff_costs import around
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.loops.near_kernel import place_lights
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Near
+from psvideo.solve.pixels_of_points import for_pixels
 
 
 def bulge(u: Array, v: Array) -> Array:

@@ -66,5 +66,6 @@ def flat(valid: NDArray[np.bool_], **cuts: NDArray[np.bool_]) -> Depth:
         parts=1,
         metric=True,
         view=View(focal_px=(10, 10)),
-        **{"cut_east": none, "cut_south": none, **cuts},
+        cut_east=cuts.get("cut_east", none),
+        cut_south=cuts.get("cut_south", none),
     )

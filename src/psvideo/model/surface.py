@@ -62,6 +62,24 @@ class Misfit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Distances:
+    """How far away near lights' falloff puts what a picture shows, on every ``step``-th row and column of it.
+
+    depth_m: (row, col), of single places along the camera's axis, in metres, above 0 everywhere.
+    costs: (ratio, row, col), how badly the distances ``plane_m`` (row, col) times e^``logs`` (ratio,) explain the light
+        of every ``each``-th of these rows and columns; ``weight`` (row, col), how much that counts.
+    """
+
+    depth_m: NDArray[np.float32]
+    step: int
+    costs: NDArray[np.float32]
+    weight: NDArray[np.float32]
+    plane_m: NDArray[np.float32]
+    logs: NDArray[np.float64]
+    each: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class Surface:
     """Normals, albedo and what to think of them, per pixel; all arrays are finite everywhere.
 
@@ -92,6 +110,9 @@ class Surface:
         not: a sheen, haze, a lamp of another strength. 0 where nobody looked for it.
     shadows_lit
         Whether light from other surfaces is seen in the subject's shadows, 0 to 1; 0 where nobody looked for it.
+    distances
+        How far away the falloff of near lights puts what is shown; None where it was not asked, or agrees with the
+        rig's plane.
 
     Notes
     -----
@@ -108,6 +129,7 @@ class Surface:
     source: NDArray[np.uint8] | None = None
     slope_deg: float = 0.0
     shadows_lit: float = 0.0
+    distances: Distances | None = None
 
     @property
     def shown(self) -> NDArray[np.bool_]:

@@ -1,7 +1,6 @@
 """The cost of each assumed distance: how badly it explains what near lights show at points of the picture."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,15 +45,6 @@ def around(light: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 
     number = sums(known.astype(np.float64))
     return np.where(number * 2 > sums(np.ones_like(light)), sums(np.where(known, light, 0)) / np.maximum(number, 1), -1)
-
-
-def for_pixels(points: NDArray[Any], count: int, shape: tuple[int, int]) -> NDArray[Any]:
-    """Return a plane of points for all pixels of a ``shape``: each stands for those over which ``around`` averages."""
-    rows, cols = (
-        np.minimum((np.arange(pixels) + count // 2) // count, there - 1)
-        for pixels, there in zip(shape, points.shape, strict=True)
-    )
-    return np.ascontiguousarray(points[rows[:, None], cols])
 
 
 def falloff_costs(

@@ -18,7 +18,7 @@ from psvideo.clip import DepthMaps
 from psvideo.model.irradiance.ground import Ground, ground_of
 from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Light, Rig
-from psvideo.model.surface import Surface
+from psvideo.model.surface import Distances, Surface
 from psvideo.solve.depth import Shaping, View, depth_of, view_of
 from psvideo.solve.normals.illumination import Illumination
 
@@ -40,6 +40,7 @@ class NearSurface:
     apart: (row, col), pixels through which no surface runs, so that what lies beside them is integrated by itself.
     torn: how far off the logarithm of distances may be because pixels may belong to another surface, (row, col) as
         what the ground is unsure of.
+    distances: what the lights' falloff says of the whole picture; None where it was not asked, or the plane holds.
     """
 
     ground: Ground
@@ -48,6 +49,7 @@ class NearSurface:
     known_m: Callable[[int], NDArray[np.float32]] | None = None
     apart: NDArray[np.bool_] | None = None
     torn: NDArray[np.float32] | None = None
+    distances: Distances | None = None
 
     def at(self, number: int) -> "NearSurface":
         """Return where the surface is at the instant with this number."""
@@ -98,7 +100,7 @@ def solve_near(
             ground = near.ground
         ground = _held_by_parts(ground, depth_m, near).with_depth(depth_m)
         surface = solve(light(ground))
-    return surface
+    return surface if near.distances is None else replace(surface, distances=near.distances)
 
 
 def _held_by_parts(ground: Ground, depth_m: NDArray[np.float32], near: NearSurface) -> Ground:
@@ -166,11 +168,10 @@ def _smaller(view: View, step: int) -> View:
 
 def near_trust(near: NearSurface) -> str:
     """Return in a whole sentence what a valid normal under near lights depends on."""
-    distance_m = -near.ground.middle_m[2]
-    source = "the rig's [surface] plane is, or with five near lights and more where their falloff puts it"
-    source = source if near.shaping.known_m is None else "the depth that was given says"
+    middle = f"{-near.ground.middle_m[2]:.3g} m away in the picture's middle"
+    source = f"the rig's [surface] plane is, {middle}, or with five near lights and more where falloff puts it"
+    source = source if near.shaping.known_m is None else f"the depth that was given says, {middle}"
     return (
-        f"The lights are near, and the subject is taken to be where {source}: {distance_m:.3g} m "
-        "away in the picture's middle. Were the lights' distances wrong by a tenth, normals would be off by about 3 "
-        "degrees."
+        f"The lights are near, and the subject is taken to be where {source}. Were the lights' distances wrong by a "
+        "tenth, normals would be off by about 3 degrees."
     )

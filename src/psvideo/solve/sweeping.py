@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from psvideo.model.irradiance.ground import Ground, spread
 from psvideo.model.rig import Light
-from psvideo.solve.falloff_costs import Plates, around, falloff_costs, for_pixels, light_at
+from psvideo.model.surface import Distances
+from psvideo.solve.falloff_costs import Plates, around, falloff_costs, light_at
 from psvideo.solve.near_surface import NearSurface
 from psvideo.solve.normals.plate_noise import noise_of
+from psvideo.solve.pixels_of_points import for_pixels
 from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
 
 LIGHTS_FOR_SWEEPING, LIGHTS_FOR_DOUBT = 5, 4
@@ -78,27 +80,38 @@ def swept(
     depth_m = for_pixels(drawn, fine, (rows, cols))
     apart = for_pixels(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
     shaping = replace(near.shaping, known_m=depth_m)
-    return replace(near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart, torn=torn)
+    distances = Distances(
+        depth_m=drawn, step=fine, costs=found.costs, weight=found.weight, plane_m=found.plane_m, logs=np.log(RATIOS),
+        each=each,
+    )  # fmt: skip
+    return replace(
+        near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart, torn=torn, distances=distances
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Distances:
+class SweptPoints:
     """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, which
-    of them enough lights ``reached``, and whether all of the surface stands on the plane."""
+    of them enough lights ``reached``, and whether all of the surface stands on the plane; and of single points, how
+    badly distances explain them, ``costs`` (ratio, row, col), what that counts for, and the plane's distance."""
 
     depth_m: NDArray[np.float32]
     unsure: NDArray[np.float32]
     reached: NDArray[np.bool_]
     on_plane: bool
+    costs: NDArray[np.float32]
+    weight: NDArray[np.float32]
+    plane_m: NDArray[np.float32]
 
 
 def _distances(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], step: int, *, noise: float, few: bool
-) -> Distances | None:
+) -> SweptPoints | None:
     """Return the distances of every ``step``-th row and column from their light (row, col, light), those of the plane
     under ``few`` lights; None where too few reach anything."""
     plane_m = ground.depth_m[::step, ::step].astype(np.float64)
-    costs, reached = _costs(ground, lights, light, plane_m, step, noise=noise)
+    planes, sound = _costs(ground, lights, light, plane_m, step, noise=noise)
+    costs, reached = _averaged(planes, sound), sound > 0
     if not reached.any():
         return None
     found = np.where(reached, plane_m * np.exp(_best(costs)), 0).astype(np.float32)
@@ -107,7 +120,10 @@ def _distances(
     unsure = _unsure(costs, len(lights), np.log(deep / plane_m), reached)
     beside = cv2.dilate(unsure * reached, np.ones((AROUND, AROUND), np.uint8))
     unsure = np.where(reached, unsure, np.maximum(unsure, beside))  # in shadow it may be any surface around
-    return Distances(depth_m=deep, unsure=unsure, reached=reached, on_plane=on_plane)
+    return SweptPoints(
+        depth_m=deep, unsure=unsure, reached=reached, on_plane=on_plane,
+        costs=planes.astype(np.float32), weight=sound.astype(np.float32), plane_m=plane_m.astype(np.float32),
+    )  # fmt: skip
 
 
 def _unsure(
@@ -144,17 +160,21 @@ def _on_plane(ratio: NDArray[np.float64], reached: NDArray[np.bool_], jumps: NDA
 def _costs(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], plane_m: NDArray[np.float64], step: int, *,
     noise: float,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:  # fmt: skip
-    """Return how badly every distance explains the points' light, (ratio, row, col), averaged over neighbours, and
-    which points enough lights reach."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
+    """Return how badly every distance explains the points' light, (ratio, row, col), and how much that counts, 0 where
+    too few lights reach a point."""
     every = np.ones(plane_m.shape, np.bool_)
     costs = falloff_costs(ground, lights, light, plane_m, RATIOS, at=every, step=step, noise=noise)
     planes = costs.reshape(len(RATIOS), *plane_m.shape)
-    reached = planes[0] > 0
-    sound = reached / (1 + EDGE * planes.min(axis=0) ** 2)
+    sound: NDArray[np.float64] = (planes[0] > 0) / (1 + EDGE * planes.min(axis=0) ** 2)
+    return planes, sound
+
+
+def _averaged(planes: NDArray[np.float64], sound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return costs (ratio, row, col) averaged over neighbours, by how ``sound`` these are."""
     known = cv2.blur(sound, (AROUND, AROUND))
     each = [np.asarray(cv2.blur(plane * sound, (AROUND, AROUND))) for plane in planes]
-    return np.stack(each) / np.maximum(known, 1e-9), reached
+    return np.stack(each) / np.maximum(known, 1e-9)
 
 
 def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -140,14 +140,16 @@ class Piece:
 @dataclass(kw_only=True)
 class Found:
     """What instants gave: what was seen of them, a picture of one round, and in whole sentences what is not known of
-    their depth."""
+    their depth, and what its ``scale`` is, empty where no depth was asked for."""
 
     observed: Observed
     picture: Pixels | None = None
     reserved: tuple[str, ...] = ()
+    scale: str = ""
 
     def followed_by(self, other: "Found") -> None:
         """Take in what was found of the instants after these."""
         self.observed.followed_by(other.observed)
         self.picture = self.picture if other.picture is None else other.picture
         self.reserved = self.reserved or other.reserved
+        self.scale = self.scale or other.scale

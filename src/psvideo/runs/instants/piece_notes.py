@@ -48,6 +48,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "dark_evenness": seen.dark_evenness.tolist(),
         "worst": [{"number": one.number, "badness": one.badness, "why": one.why} for one in seen.thumbnails],
         "reserved": found.reserved,
+        "scale": found.scale,
     }
     arrays: dict[str, NDArray[Any]] = {f"light{n}": one.light for n, one in enumerate(seen.light_at_points)}
     arrays |= {f"white{n}": one.white for n, one in enumerate(seen.light_at_points)}
@@ -132,7 +133,7 @@ def _read(path: Path) -> tuple[range, Found]:
             ),
         )
         picture = arrays["picture"] if "picture" in arrays.files else None
-    found = Found(observed=observed, picture=picture, reserved=tuple(record["reserved"]))
+    found = Found(observed=observed, picture=picture, reserved=tuple(record["reserved"]), scale=record["scale"])
     return range(*record["numbers"]), found
 
 

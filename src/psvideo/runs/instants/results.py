@@ -30,7 +30,6 @@ from psvideo.runs.instants.reporting import run_report, write_report
 from psvideo.runs.instants.shot_and_settings import Solved
 from psvideo.runs.instants.solving import knowing_subject, write_instants
 from psvideo.runs.steps.output import Output, begun_by, folder_of
-from psvideo.solve.depth import scale_note
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import trust_note
 
@@ -118,7 +117,7 @@ def finished(job: Job, folder: Path, output: Output, found: Found, *, watch: Wat
         lighting=lighting,
         solver=method,
         trust=" ".join([trust_note(method, len(take.plan.lights)), *lighting.near_notes, *colours_said]),
-        depth="" if job.shaping is None else scale_note(job.shaping),
+        depth=found.scale,
         warnings=(
             *lighting.doubts,
             *pass_doubts(job.asked, take.plan),

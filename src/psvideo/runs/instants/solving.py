@@ -23,7 +23,7 @@ from psvideo.runs.delivery.relit import blur_of
 from psvideo.runs.instants.depths import shape_of
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece
 from psvideo.runs.instants.reporting import observing
-from psvideo.solve.depth import kept_beside, reservations
+from psvideo.solve.depth import kept_beside, reservations, scale_note
 from psvideo.solve.instants import Instant, denoised, subject_of, surfaces
 
 SPECULAR_OF_LIGHTS = "specular_of_lights"
@@ -76,7 +76,8 @@ def write_instants(
             if observed.first is not None and number - observed.first in (0, SAMPLE_ROUND - 1) and observed.facts:
                 found.picture = (picture_of or instant_sheet)(instant)
             del instant  # its plates would be held while the next round gathers
-    found.reserved = () if shaping is None else reservations(shaping)
+    if shaping is not None:
+        found.reserved, found.scale = reservations(shaping), scale_note(shaping)
     return found
 
 

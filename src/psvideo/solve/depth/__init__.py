@@ -3,7 +3,8 @@
 ``view`` says how normals and depth belong together. ``cao2022`` finds the height with its jumps: ``integration`` and
 ``reweighting`` go round, ``multigrid`` solves each round (``checkerboard`` and ``torn_blocks`` hold its grids).
 ``simchony1990`` is the fast path for whole rectangles. ``scale`` gives the height a scale by its ``anchors``,
-``shaping`` keeps that over a clip, and ``mesh`` makes triangles of it.
+``shaping`` keeps that over a clip, and ``mesh`` makes triangles of it. Under near lights ``torn_surfaces`` says what is
+integrated apart, and ``placing`` how far away it is, by ``falloff_evidence``.
 """
 
 from psvideo.solve.depth.cao2022 import Height, Integration, integrate

@@ -10,6 +10,7 @@ rounds, and is held there to the first one's height by so weak a force that only
 how far away a piece is around which the surface is cut.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
 from psvideo.solve.depth.view import Box, Slopes, View, slopes_of
 
-__all__ = ["BILATERAL", "SMOOTH", "Before", "Height", "Integration", "integrate"]
+__all__ = ["BILATERAL", "SMOOTH", "Before", "Height", "Integration", "integrate", "laid_together"]
 
 CUT_SHARE = 0.1
 """Neighbours count as cut apart when less than this share of the weight between them is left; half is left where a
@@ -45,6 +46,7 @@ class Height:
     valid: (row, col).
     cut_east, cut_south: (row, col), True where the surface jumps between a pixel and its right or lower neighbour.
     rightward, downward: (row, col), how much a pixel's step to the right and down counts against the opposite one.
+    layers: what is valid by layers (row, col) that were integrated one by one; empty where it was all at once.
     """
 
     height: Doubles
@@ -53,6 +55,7 @@ class Height:
     cut_south: Mask
     rightward: Floats
     downward: Floats
+    layers: tuple[Mask, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +67,17 @@ class Before:
 
     def kept_in(self, spare: Path | None) -> "Before":
         """Return the same, of which what is large lies in files in a folder, if there is one."""
-        planes = {name: kept_in(getattr(self.height, name), spare) for name in ("height", "rightward", "downward")}
-        return Before(height=replace(self.height, **planes), normals=kept_in(self.normals, spare))
+        height = replace(
+            self.height,
+            height=kept_in(self.height.height, spare),
+            rightward=kept_in(self.height.rightward, spare),
+            downward=kept_in(self.height.downward, spare),
+        )
+        return Before(height=height, normals=kept_in(self.normals, spare))
+
+    def where(self, stays: Mask) -> "Before":
+        """Return the same, known in some of its pixels only."""
+        return replace(self, height=replace(self.height, valid=self.height.valid & stays))
 
     def let_go(self) -> None:
         """Let go what lies in files until it is looked at again."""
@@ -105,6 +117,26 @@ def integrate(
     return Height(
         height=height, valid=valid, cut_east=cut_east, cut_south=cut_south, rightward=rightward, downward=downward
     )
+
+
+def laid_together(heights: Sequence[Height]) -> Height:
+    """Return the heights of layers of a picture, none of whose pixels are valid in two, as one that is cut between
+    them; takes the first one's memory."""
+    first = heights[0]
+    if len(heights) == 1:
+        return first
+    valid, layer = first.valid.copy(), np.zeros(first.valid.shape, np.uint8)
+    for number, one in enumerate(heights[1:], 1):
+        layer[one.valid] = number
+        for name in ("height", "cut_east", "cut_south", "rightward", "downward"):
+            into, plane = getattr(first, name), getattr(one, name)
+            for top, end in bands(len(plane)):
+                np.copyto(into[top:end], plane[top:end], where=one.valid[top:end])
+                let_go(into[top:end], plane[top:end])
+        valid |= one.valid
+    first.cut_east[:, :-1] |= (layer[:, :-1] != layer[:, 1:]) & valid[:, :-1] & valid[:, 1:]
+    first.cut_south[:-1] |= (layer[:-1] != layer[1:]) & valid[:-1] & valid[1:]
+    return replace(first, valid=valid, layers=tuple(one.valid for one in heights))
 
 
 def _whole(plane: NDArray[Any], shape: tuple[int, ...], box: Box, spare: Path | None) -> NDArray[Any]:

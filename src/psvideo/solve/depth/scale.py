@@ -8,7 +8,7 @@ the surface breathe; a subject that comes nearer keeps its distance as well, for
 stays.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import bands, kept_in, let_go
 from psvideo.model.arrays import Doubles, Mask
+from psvideo.model.surface import Distances
 from psvideo.solve.depth.anchors import Anchor, Plane, anchors_of, depth_from_height
 from psvideo.solve.depth.cao2022 import Height
+from psvideo.solve.depth.placing import Placed, placed_by
 from psvideo.solve.depth.view import Box, View
 
 LEAST_PART_PX = 64
@@ -45,6 +47,8 @@ class Depth:
         Whether depth is in metres.
     view
         The lens; ``view.points(depth)`` gives the points (row, col, 3) in the camera's frame.
+    placed
+        How far away near lights' falloff put each part; empty where it did not.
     """
 
     depth: NDArray[np.float32]
@@ -53,6 +57,7 @@ class Depth:
     parts: int
     metric: bool
     view: View
+    placed: tuple[Placed, ...] = ()
 
     @property
     def valid(self) -> Mask:
@@ -77,23 +82,27 @@ def depth_of_height(
     plane: Plane | None = None,
     reference: Depth | None = None,
     known_m: NDArray[np.float32] | None = None,
+    distances: Distances | None = None,
 ) -> Depth:
-    """Return the depth of a height: its parts where they are known to be, or as in ``reference``, or on the ``plane``.
+    """Return the depth of a height: its parts where they are known to be, or where near lights' ``distances`` put them,
+    or as in ``reference``, or on the ``plane``.
 
     ``plane`` is n . X + d = 0 in camera coordinates, metres; ``known_m`` (row, col) is depth along the axis, 0 where it
-    is not known. Both mean something in a perspective view only.
+    is not known. All mean something in a perspective view only.
     """
-    anchors = anchors_of(view, height.valid.shape, plane, None if reference is None else reference.depth, known_m)
-    count, labels, facts, _ = cv2.connectedComponentsWithStats(height.valid.astype(np.uint8), connectivity=4)
+    before = None if reference is None else reference.depth
+    anchors = anchors_of(view, height.valid.shape, plane, before, known_m)
     depth = np.zeros(height.valid.shape, np.float32)
     parts = 0
-    for number in range(1, count):  # 0 is what is not valid
-        left, top, width, high, size = facts[number]
-        if size < LEAST_PART_PX:
-            continue
+    placed: list[Placed] = []
+    for part in _parts(height.layers or (height.valid,)):
         parts += 1
-        part = _Part(rows=slice(top, top + high), cols=slice(left, left + width), labels=labels, number=number)
-        _put(depth, height.height, part, _shift(height.height, part, anchors), view)
+        if distances is None or known_m is not None:
+            shift = _shift(height.height, part, anchors)
+        else:
+            shift, place = placed_by(distances, height.height, part.mask, view, before)
+            placed.append(place)
+        _put(depth, height.height, part, shift, view)
     return Depth(
         depth=depth,
         cut_east=height.cut_east,
@@ -101,6 +110,7 @@ def depth_of_height(
         parts=parts,
         metric=view.perspective and not (plane is None and known_m is None),
         view=view,
+        placed=tuple(placed),
     )
 
 
@@ -113,11 +123,25 @@ class _Part:
     labels: NDArray[Any]
     number: int
 
+    def mask(self, box: Box) -> Mask:
+        """What of a rectangle is the part's."""
+        return np.asarray(self.labels[box] == self.number)
+
     def bands(self) -> Iterator[tuple[Box, Mask]]:
         """Yield the rectangles of a few rows each, and what of them is the part's."""
         for first, last in bands(self.rows.stop - self.rows.start):
             box = slice(self.rows.start + first, self.rows.start + last), self.cols
             yield box, self.labels[box] == self.number
+
+
+def _parts(layers: Sequence[Mask]) -> Iterator[_Part]:
+    """Give the pieces that layers fall into, but for speckles."""
+    for layer in layers:
+        count, labels, facts, _ = cv2.connectedComponentsWithStats(layer.astype(np.uint8), connectivity=4)
+        for number in range(1, count):  # 0 is what is not valid
+            left, top, width, high, size = facts[number]
+            if size >= LEAST_PART_PX:
+                yield _Part(rows=slice(top, top + high), cols=slice(left, left + width), labels=labels, number=number)
 
 
 def _shift(height: Doubles, part: _Part, anchors: list[Anchor]) -> float:

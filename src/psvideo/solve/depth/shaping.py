@@ -7,11 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.rig import Rig, check_rig
-from psvideo.model.surface import Surface, check_surface
+from psvideo.model.surface import Distances, Surface, check_surface
 from psvideo.solve.depth.anchors import Plane
-from psvideo.solve.depth.cao2022 import BILATERAL, Before, Height, Integration, integrate
+from psvideo.solve.depth.cao2022 import BILATERAL, Before, Height, Integration, integrate, laid_together
+from psvideo.solve.depth.placing import stays
 from psvideo.solve.depth.scale import Depth, depth_of_height
+from psvideo.solve.depth.torn_surfaces import layers_of
 from psvideo.solve.depth.view import View, view_of
+
+MOST_NAMED = 4
+"""Of the surfaces that near lights' falloff put somewhere, the largest are named."""
+DOUBTFUL = 0.1
+"""Distances that may be off by more than this share are named in the report."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,13 +43,14 @@ class Shaping:
         """Whether depth is in metres: a perspective view, and a plane or depth that says how far away things are."""
         return self.view.perspective and (self.plane is not None or self.known_m is not None)
 
+    def distances_of(self, surface: Surface) -> Distances | None:
+        """Return how far away near lights' falloff puts a surface, None where depth that was given comes before."""
+        return surface.distances if self.view.perspective and self.known_m is None else None
+
 
 def depth_of(shaping: Shaping, surface: Surface) -> Depth:
     """Return the depth of one instant; safe to call from several threads."""
-    how, before, spare = shaping.how, shaping.before, shaping.spare
-    return _scaled(
-        shaping, integrate(surface.normals, surface.shown, shaping.view, how=how, before=before, spare=spare)
-    )
+    return _scaled(shaping, _height_of(shaping, surface), surface)
 
 
 def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
@@ -89,8 +97,29 @@ def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
     )
 
 
-def _scaled(shaping: Shaping, height: Height) -> Depth:
-    return depth_of_height(height, shaping.view, plane=shaping.plane, reference=shaping.first, known_m=shaping.known_m)
+def _height_of(shaping: Shaping, surface: Surface) -> Height:
+    """Return the height of a surface; what near lights' falloff puts apart is integrated apart."""
+    how, view, before, spare = shaping.how, shaping.view, shaping.before, shaping.spare
+    distances = shaping.distances_of(surface)
+    if distances is None:
+        return integrate(surface.normals, surface.shown, view, how=how, before=before, spare=spare)
+    if before is not None and shaping.first is not None:
+        before = before.where(stays(distances, shaping.first.depth))
+    layers = layers_of(distances, surface.normals, surface.shown, view, how)
+    return laid_together(
+        [integrate(surface.normals, layer, view, how=how, before=before, spare=spare) for layer in layers]
+    )
+
+
+def _scaled(shaping: Shaping, height: Height, surface: Surface) -> Depth:
+    return depth_of_height(
+        height,
+        shaping.view,
+        plane=shaping.plane,
+        reference=shaping.first,
+        known_m=shaping.known_m,
+        distances=shaping.distances_of(surface),
+    )
 
 
 def begun(shaping: Shaping, surface: Surface) -> Shaping:
@@ -98,9 +127,10 @@ def begun(shaping: Shaping, surface: Surface) -> Shaping:
 
     All later instants begin from the first one, and never from each other: each can be done by itself.
     """
-    height = integrate(surface.normals, surface.shown, shaping.view, how=shaping.how, spare=shaping.spare)
-    first = _scaled(replace(shaping, first=None), height)
-    before = Before(height=height, normals=surface.normals)
+    shaping = replace(shaping, first=None, before=None)
+    height = _height_of(shaping, surface)
+    first = _scaled(shaping, height, surface)
+    before = Before(height=replace(height, layers=()), normals=surface.normals)
     return replace(shaping, first=first.kept_in(shaping.spare), before=before.kept_in(shaping.spare))
 
 
@@ -114,9 +144,22 @@ def kept_beside(shaping: Shaping | None, spare: Path) -> Shaping | None:
 
 
 def scale_note(shaping: Shaping) -> str:
-    """Return in a sentence what a clip's depth is measured in: from normals alone nothing knows its scale."""
+    """Return in a sentence or two what a clip's depth is measured in: from normals alone nothing knows its scale."""
+    placed = () if shaping.first is None else shaping.first.placed
+    if shaping.metric and placed:
+        parts = sorted(placed, key=lambda part: -part.share)[:MOST_NAMED]
+        named = "; ".join(f"{part.words}, {_percent(part.share)} of the picture" for part in parts)
+        return (
+            "Depth is in metres. How far away each surface is was found by how the near lights fall off, as well as "
+            f"these are known to the rig. In the first result: {named}."
+        )
+    if shaping.metric and shaping.known_m is not None:
+        return "Depth is in metres: its scale is that of the depth given."
     if shaping.metric:
-        return "Depth is in metres: its scale is the rig's [surface] plane's, or that of the depth given."
+        return (
+            "Depth is in metres: its scale is the rig's [surface] plane's, on which the middle of each part is put. It "
+            "is off by as much as the subject stands before or behind that plane."
+        )
     if shaping.view.perspective:
         return (
             "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
@@ -127,6 +170,10 @@ def scale_note(shaping: Shaping) -> str:
     )
 
 
+def _percent(share: float) -> str:
+    return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
+
+
 def reservations(shaping: Shaping) -> tuple[str, ...]:
     """Return in whole sentences what is not known of a clip's depth."""
     said = []
@@ -135,9 +182,18 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
             "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: a subject near "
             "the camera is bent. Give the focal length."
         )
-    if shaping.first is not None and shaping.first.parts > 1:
+    first = shaping.first
+    if first is not None and first.placed:
+        doubtful = sum(part.share for part in first.placed if part.unsure > DOUBTFUL)
+        if doubtful >= 0.01:
+            said.append(
+                f"How far away {_percent(doubtful)} of the picture is, the falloff of the near lights hardly tells: "
+                f"its depth may be off by more than {100 * DOUBTFUL:.0f} %. A known depth (`depth`), more lights or a "
+                "rig that is measured better would say."
+            )
+    elif first is not None and first.parts > 1:
         said.append(
-            f"What is valid falls into {shaping.first.parts} parts, and how they lie to each other normals cannot "
+            f"What is valid falls into {first.parts} parts, and how they lie to each other normals cannot "
             "say: each was given its depth by itself."
         )
     return tuple(said)

@@ -36,6 +36,13 @@ class View:
         """Return the principal point (col, row): where nobody said it, the middle of the picture."""
         return self.principal_px or ((cols - 1) / 2, (rows - 1) / 2)
 
+    def thinned(self, step: int, shape: tuple[int, ...]) -> "View":
+        """Return the view of every ``step``-th row and column of a picture of this shape."""
+        if self.focal_px is None or step == 1:
+            return self
+        x, y = (middle / step for middle in self.middle_px(*shape))
+        return View(focal_px=(self.focal_px[0] / step, self.focal_px[1] / step), principal_px=(x, y))
+
     def rays(self, rows: int, cols: int) -> tuple[Doubles, Doubles]:
         """Return x, shape (col,), and y, shape (row, 1), of the ray (x, y, -1) through every pixel's centre.
 
