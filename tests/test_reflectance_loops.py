@@ -65,12 +65,20 @@ def counts(rng: np.random.Generator) -> Array:
     return counts
 
 
-def parts_of(measured: Array, towards: Array, half: Array, to_camera: Array, g: Array) -> Array:
+SOFTNESS = (0.0, False)
+
+
+def parts_of(
+    measured: Array, towards: Array, half: Array, to_camera: Array, g: Array, in_place: tuple[float, bool] = SOFTNESS
+) -> Array:
+    """In softness' place may stand a lobe of some power, in shares of the albedo or not."""
     size, normals = np.linalg.norm(g, axis=1), unit(g)
     c, h = (towards * normals).sum(axis=-1), np.maximum((half * normals).sum(axis=-1), 0)
     bright = (c > 0) * np.minimum(TYPICAL / size, MOST_BRIGHT)
+    power, on_paint = in_place
+    soft = h**power * ((c > 0) if on_paint else bright) if power else 1 - c
     return np.concatenate(
-        [[measured / size, c * c * (c > 0), rough(normals, towards, to_camera, c)[0], 1 - c], bright * h**POWERS]
+        [[measured / size, c * c * (c > 0), rough(normals, towards, to_camera, c)[0], soft], bright * h**POWERS]
     )
 
 
@@ -82,20 +90,23 @@ def rough(normals: Array, towards: Array, to_camera: Array, c: Array) -> Array:
     return found.reshape(3, *c.shape)
 
 
-def shown(rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array) -> Array:
+def shown(
+    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array, in_place: tuple[float, bool]
+) -> Array:
     """What is measured of such points under the model, with noise."""
-    parts = parts_of(np.zeros(towards.shape[:2]), towards, half, to_camera, g)[1:]
+    parts = parts_of(np.zeros(towards.shape[:2]), towards, half, to_camera, g, in_place)[1:]
     c = (towards * unit(g)).sum(axis=-1)
     shade = np.maximum(c, 0) + np.tensordot(MODEL, parts, axes=1)
     return np.asarray(np.linalg.norm(g, axis=1) * shade + rng.normal(0, 0.003, c.shape))
 
 
+@pytest.mark.parametrize("in_place", [SOFTNESS, (2.0, False), (1.5, True)])
 def test_parts_are_what_each_number_of_the_model_adds(
-    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array
+    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array, in_place: tuple[float, bool]
 ) -> None:
     measured, found = rng.random((LIGHTS, POINTS)), np.empty((7, LIGHTS, POINTS))
-    fill_parts(measured, towards, half, to_camera, g, TYPICAL, found)
-    np.testing.assert_allclose(found, parts_of(measured, towards, half, to_camera, g), rtol=1e-12, atol=1e-15)
+    fill_parts(measured, towards, half, to_camera, g, TYPICAL, *in_place, found)
+    np.testing.assert_allclose(found, parts_of(measured, towards, half, to_camera, g, in_place), rtol=1e-12, atol=1e-15)
 
 
 def test_what_no_vector_of_a_points_own_explains_is_left(
@@ -130,35 +141,48 @@ def test_numbers_within_bounds_are_the_least_of_the_form(rng: np.random.Generato
         assert (slope[(found == most) & (least < most)] < 0).all()
 
 
+@pytest.mark.parametrize("in_place", [SOFTNESS, (2.0, False), (1.5, True)])
 def test_a_step_is_that_of_gauss_and_newton_with_cauchys_weights(
-    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array, counts: Array
-) -> None:
-    measured = shown(rng, towards, half, to_camera, g)
+    rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array, counts: Array,
+    in_place: tuple[float, bool],
+) -> None:  # fmt: skip
+    measured = shown(rng, towards, half, to_camera, g, in_place)
     begun = g * rng.uniform(0.9, 1.1, g.shape)
     found = np.empty_like(g)
-    solve_again(measured, counts, towards, half, to_camera, begun, MODEL, TYPICAL, found)
+    solve_again(measured, counts, towards, half, to_camera, begun, MODEL, TYPICAL, *in_place, found)
     for point in range(POINTS):
         one = measured[:, point], counts[:, point], towards[:, point], half[:, point], to_camera[point]
-        np.testing.assert_allclose(found[point], stepped(*one, begun[point]), rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(found[point], stepped(*one, begun[point], in_place), rtol=1e-6, atol=1e-8)
 
 
-def stepped(measured: Array, counts: Array, towards: Array, half: Array, to_camera: Array, g: Array) -> Array:
+def stepped(
+    measured: Array, counts: Array, towards: Array, half: Array, to_camera: Array, g: Array,
+    in_place: tuple[float, bool],
+) -> Array:  # fmt: skip
     """Return one point's step; slopes are differences, of the light that its normal times albedo sends."""
-    size = float(np.linalg.norm(g))
+    size, (power, on_paint) = float(np.linalg.norm(g)), in_place
     bright = min(TYPICAL / size, MOST_BRIGHT)
+    lobes, much = POWERS[..., 0], bright * MODEL[3:, None]
+    if power:
+        lobes = np.append(lobes, [[power]], axis=0)
+        much = np.append(much, [[MODEL[2] * (1 if on_paint else bright)]], axis=0)
+
+    def shine(of: Array) -> Array:
+        """Highlights are those of the typical albedo, or of this one: what they add does not grow with g."""
+        h = np.maximum(half @ unit(of), 0)
+        return np.asarray(size * (towards @ of > 0) * (much * h**lobes).sum(axis=0))
 
     def shade(of: Array) -> Array:
-        """What is matte, curved, rough or soft counts by the albedo; highlights are those of the typical one."""
+        """What is matte, curved, rough or soft counts by the albedo."""
         normals = unit(of)[None]
-        c, h = towards @ normals[0], np.maximum(half @ normals[0], 0)
+        c = towards @ normals[0]
         added = rough(normals, towards[:, None], to_camera, c[:, None])[0, :, 0]
-        matte = np.linalg.norm(of) * (c + MODEL[0] * (c > 0) * c * c + MODEL[1] * added + MODEL[2] * (1 - c))
-        return np.asarray(matte + size * (c > 0) * bright * (MODEL[3:, None] * h ** POWERS[..., 0]).sum(axis=0))
+        soft = 0 if power else MODEL[2] * (1 - c)
+        matte = np.linalg.norm(of) * (c + MODEL[0] * (c > 0) * c * c + MODEL[1] * added + soft)
+        return np.asarray(matte + shine(of))
 
     small = 1e-6 * size
     slopes = np.stack([(shade(g + d) - shade(g - d)) / (2 * small) for d in small * np.eye(3)], axis=-1)
-    h = np.maximum(half @ unit(g), 0)
-    shine = size * (towards @ g > 0) * bright * (MODEL[3:, None] * h ** POWERS[..., 0]).sum(axis=0)
     rest = np.abs(measured - shade(g))
     many = int(counts.sum())
     order = np.sort(rest[counts > 0])
@@ -167,5 +191,5 @@ def stepped(measured: Array, counts: Array, towards: Array, half: Array, to_came
     weights = counts / (1 + (rest / (width * max(typical, LEAST_SHARE * size))) ** 2)
     square = (slopes * weights[:, None]).T @ slopes
     square += (1e-6 * np.trace(square) + 1e-12) * np.eye(3)
-    step = np.linalg.solve(square, slopes.T @ (weights * (measured - shine))) - g
+    step = np.linalg.solve(square, slopes.T @ (weights * (measured - shine(g)))) - g
     return np.asarray(g + step * min(1, LONGEST_STEP * size / max(float(np.linalg.norm(step)), 1e-12)))

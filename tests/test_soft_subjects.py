@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 SIZE, NOISE = 72, 0.002
 UNEVEN = np.concatenate([ring(5, 50), ring(3, 25)])
 FIVE = np.concatenate([ring(4, 50), ring(1, 5)])
+UNEVEN_FIVE = np.concatenate([ring(3, 50), ring(2, 25)])
+SIX = np.concatenate([ring(4, 50), ring(2, 20)])
 FOUR = np.concatenate([ring(3, 50), ring(1, 5)])
 
 
@@ -132,6 +134,37 @@ def test_what_ends_at_the_shadows_edge_is_not_soft(shade: Callable[[Array], Arra
     plates, *_ = filmed(UNEVEN, shade)
     misfit = solve_images(plates, UNEVEN).misfit
     assert misfit is None or misfit.reflectance is None or misfit.reflectance.soft == 0
+
+
+def sheen(normals: Array, way: Array, power: float, strength: float) -> Array:
+    """Light of a lobe around the mirrored direction, in shares of the albedo, that ends where a lamp does not reach."""
+    half = way + np.array([0.0, 0.0, 1.0])
+    return np.asarray(strength * np.maximum(normals @ (half / np.linalg.norm(half)), 0) ** power * (normals @ way > 0))
+
+
+@pytest.mark.parametrize(
+    ("ways", "power"),
+    [(UNEVEN, 2), (UNEVEN, 3), (SIX, 2), (SIX, 3), (UNEVEN_FIVE, 2)],
+    ids=["eight, h^2", "eight, h^3", "six, h^2", "six, h^3", "five, h^2"],
+)
+def test_a_very_broad_sheen_is_not_taken_for_softness(ways: Array, power: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, normals, inside = filmed(ways, lambda cosine: cosine)
+    rng, paint = np.random.default_rng(3), np.array([0.6, 0.45, 0.35]) * inside[..., None]
+    plates = [
+        (np.maximum(normals @ way, 0) + sheen(normals, way, power, 0.5))[..., None] * paint
+        + rng.normal(0, NOISE, paint.shape)
+        for way in ways
+    ]
+    pictures = [each.astype(np.float32) for each in plates]
+    found = Solving(error=True).solve(pictures, under(ways), mask=inside)
+    off, error_deg = off_deg(found, normals, inside), found.error_deg
+    assert found.misfit is not None
+    assert found.misfit.reflectance is None or found.misfit.reflectance.soft == 0
+    assert error_deg is not None
+    assert (off <= 2 * error_deg[inside]).mean() > 0.9
+    monkeypatch.setattr(reflectance_fit, "VERY_BROAD", ())
+    soft = Solving(error=True).solve(pictures, under(ways), mask=inside)
+    assert off_deg(soft, normals, inside).mean() > 1.2 * off.mean()
 
 
 def test_lights_that_are_off_do_not_make_a_matte_subject_soft() -> None:

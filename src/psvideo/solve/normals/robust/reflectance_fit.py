@@ -69,6 +69,20 @@ OUTLYING = 3.0
 """Shadows' edges and narrow highlights are few, and far off."""
 
 
+class InPlace(NamedTuple):
+    """What stands in softness' place: a lobe h^``power`` in shares of the albedo (``on_paint``) or whatever the albedo,
+    or, of power 0, softness itself."""
+
+    power: float = 0.0
+    on_paint: bool = False
+
+
+SOFTNESS = InPlace()
+VERY_BROAD = (InPlace(2, True), InPlace(2), InPlace(3, True), InPlace(3), InPlace(1.5, True))
+"""Sheens so broad that they look like softness: both brighten what hardly faces the lights, but the one turns normals
+by 3 to 10 degrees where the other does not. Softness has to explain more than each of these."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SubjectPoints:
     """Points of the subject: measurements (light, point) in units of every light's strength, which of them count
@@ -155,7 +169,7 @@ def _of_all(points: SubjectPoints) -> Reflectance | None:
     kind, best = "shining", alternated(points, g, typical)
     for other in _to_try(points):
         found = alternated(points, g, typical, other)
-        if _leaves_less(found, best, other, few=few) and (other == "rough" or _faces_it(points, found.g, best.g)):
+        if _leaves_less(found, best, other, few=few) and (other == "rough" or _is_soft(points, g, found, best)):
             kind, best = other, found
     if best.explained < (FEW_EXPLAIN if few else LEAST_EXPLAINED) or (few and kind == "shining"):
         return None
@@ -176,6 +190,16 @@ def _leaves_less(found: ModelFollowed, before: ModelFollowed, kind: Literal["rou
     return bool(LEAST_SOFT <= number < MOST_SOFT and left < (FEW_LEAVE if few else MUCH_LESS_LEFT))
 
 
+def _is_soft(points: SubjectPoints, g: Doubles, found: ModelFollowed, before: ModelFollowed) -> bool:
+    """Whether what explains points as softness is that, and no very broad sheen; ``g`` are their normals times albedo
+    without a model, ``before`` the best model without softness."""
+    if not _faces_it(points, found.g, before.g):
+        return False
+    typical = median(np.linalg.norm(g, axis=1))
+    shining = (alternated(points, g, typical, "soft", in_place=one) for one in VERY_BROAD)
+    return all(found.explained > one.explained for one in shining)
+
+
 def _faces_it(points: SubjectPoints, g: Doubles, before: Doubles) -> bool:
     """Return whether normals (of any length) face the camera, but for few more than ``before``."""
     away, were = (((points.to_camera * one).sum(axis=-1) < 0).mean() for one in (g, before))
@@ -190,19 +214,19 @@ def sizes_of(points: SubjectPoints) -> Doubles:
 
 def alternated(
     points: SubjectPoints, g: Doubles, typical: float, kind: Kind = "shining", *,
-    turns: int = ALTERNATIONS, least: float = -np.inf,
+    turns: int = ALTERNATIONS, least: float = -np.inf, in_place: InPlace = SOFTNESS,
 ) -> ModelFollowed:  # fmt: skip
     """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
-    than the ``least``."""
+    than the ``least``. What is ``in_place`` of softness has its number, and takes the place in what is soft."""
     points, nothing = points.in_order(), ModelFollowed(np.zeros(NUMBERS), 0.0, g)
     model, explained = np.zeros(NUMBERS), 0.0
     for turn in range(turns):
-        model, explained = _model(points, g, typical, kind)
+        model, explained = _model(points, g, typical, kind, in_place)
         absent = kind in OF_KIND and not model[OF_KIND[kind]]
         if (turn and explained < HOPELESS) or absent or explained <= least:
             return nothing
         for _ in range(SOLVED_AGAIN):
-            g = _solved_again(points, g, model, typical)
+            g = _solved_again(points, g, model, typical, in_place)
     return ModelFollowed(model, explained, g)
 
 
@@ -234,12 +258,12 @@ def _medians(values: Doubles, counts: Mask) -> Doubles:
     return np.where(number > 0, (lower + upper) / 2, 0.0)
 
 
-def _parts(points: SubjectPoints, g: Doubles, typical: float) -> Doubles:
+def _parts(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlace = SOFTNESS) -> Doubles:
     """Return what was measured, in albedos, and what each number of the model would add, (part, light, point)."""
     from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
 
     parts = np.empty((1 + NUMBERS, *points.measured.shape))
-    fill_parts(points.measured, points.towards, points.half, points.to_camera, g, typical, parts)
+    fill_parts(points.measured, points.towards, points.half, points.to_camera, g, typical, *in_place, parts)
     return parts
 
 
@@ -252,14 +276,14 @@ def _left(points: SubjectPoints, weights: Doubles, parts: Doubles) -> Doubles:
     return left
 
 
-def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind) -> tuple[Doubles, float]:
+def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind, in_place: InPlace) -> tuple[Doubles, float]:
     """Return the numbers of the model, and the share of the squares of what is left over that it explains.
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
     """
     from psvideo.solve.normals.robust.reflectance_kernel import add_squares
 
-    parts = _parts(points, g, typical)
+    parts = _parts(points, g, typical, in_place)
     weights, model, spread = points.counts, np.zeros(NUMBERS), 1.0
     left, square, right = parts, np.empty((NUMBERS, NUMBERS)), np.empty(NUMBERS)
     for turn in range(REWEIGHTED):
@@ -269,7 +293,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind) -> tup
         spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), 1e-4)
         per = COUNTED / spread**2 / points.counts.sum()
         add_squares(weights, left, square, right)
-        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, kind)
+        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, kind, in_place)
         rest = own - np.tensordot(model, others, axes=1)
         if turn < REWEIGHTED - 1:
             weights = points.counts / (1 + (rest / (MODEL_WIDTH * spread)) ** 2)
@@ -277,7 +301,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind) -> tup
     return model, 1 - after / max(before, 1e-30)
 
 
-def _bounded(square: Doubles, right: Doubles, kind: Kind) -> Doubles:
+def _bounded(square: Doubles, right: Doubles, kind: Kind, in_place: InPlace) -> Doubles:
     """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, what is
     rough is not dark under grazing light as well, and what is soft has no curve of its own."""
     from psvideo.solve.normals.robust.reflectance_kernel import descend_within
@@ -286,17 +310,17 @@ def _bounded(square: Doubles, right: Doubles, kind: Kind) -> Doubles:
     if kind == "rough":
         most[0], most[ROUGH] = 0.0, MOST_ROUGH
     elif kind == "soft":
-        least[0], most[0], most[SOFT] = 0.0, 0.0, MOST_SOFT
+        least[0], most[0], most[SOFT] = 0.0, 0.0, MOST_LOBE if in_place.power else MOST_SOFT
     found = np.empty(NUMBERS)
     descend_within(square, right, least, most, found)
     return found
 
 
-def _solved_again(points: SubjectPoints, g: Doubles, model: Doubles, typical: float) -> Doubles:
+def _solved_again(points: SubjectPoints, g: Doubles, model: Doubles, typical: float, in_place: InPlace) -> Doubles:
     """Return g after a step of reweighted Gauss and Newton under the model."""
     from psvideo.solve.normals.robust.reflectance_kernel import solve_again
 
     found = np.empty_like(g)
     ways = points.towards, points.half, points.to_camera
-    solve_again(points.measured, points.counts, *ways, g, model, typical, found)
+    solve_again(points.measured, points.counts, *ways, g, model, typical, *in_place, found)
     return found

@@ -82,9 +82,13 @@ def _size_and_normal(g: Doubles, point: int, normal: Doubles) -> float:
 
 @FUSED.kept
 def fill_parts(
-    measured: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles, typical: float, parts: Doubles
-) -> None:
-    """Fill ``parts`` (part, light, point): what was measured, in albedos, and what each number of the model adds."""
+    measured: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles, typical: float,
+    power: float, on_paint: bool, parts: Doubles,
+) -> None:  # fmt: skip
+    """Fill ``parts`` (part, light, point): what was measured, in albedos, and what each number of the model adds.
+
+    A ``power`` above 0 puts a lobe h^power in softness' place, in shares of the albedo where ``on_paint``, else
+    whatever the albedo."""
     normal = np.empty(3)
     for p in range(len(g)):
         size = _size_and_normal(g, p, normal)
@@ -97,7 +101,8 @@ def fill_parts(
             parts[0, light, p] = measured[light, p] / size
             parts[1, light, p] = c * c * lit
             parts[2, light, p] = _roughness(c, facing, _facing(to_camera, p, towards[light, p]))[0]
-            parts[3, light, p] = 1.0 - c
+            lobe = lit * (1.0 if on_paint else bright)
+            parts[3, light, p] = lobe * h**power if power > 0.0 else 1.0 - c
             parts[4, light, p] = lit * bright * h8
             parts[5, light, p] = lit * bright * h32
             parts[6, light, p] = lit * bright * (h32 * h32) ** 2
@@ -184,10 +189,11 @@ def _typical(rest: Doubles, counts: Doubles, point: int, order: Doubles) -> floa
 @FUSED.kept
 def solve_again(
     measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles,
-    model: Doubles, typical: float, found: Doubles,
+    model: Doubles, typical: float, power: float, on_paint: bool, found: Doubles,
 ) -> None:  # fmt: skip
-    """Fill ``found`` with g (point, 3) after a step of reweighted Gauss and Newton under the model."""
-    lights = len(measured)
+    """Fill ``found`` with g (point, 3) after a step of reweighted Gauss and Newton under the model, ``power`` and
+    ``on_paint`` as in ``fill_parts``."""
+    lights, soft = len(measured), 0.0 if power > 0.0 else model[2]
     normal, matrix, right = np.empty(3), np.empty(6), np.empty(3)
     rows, matte, rest, order = np.empty((lights, 3)), np.empty(lights), np.empty(lights), np.empty(lights)
     for p in range(len(g)):
@@ -205,11 +211,12 @@ def solve_again(
             h127 = h31 * ((h31 * h) ** 2 * (h31 * h))
             much = lit * bright
             broad, middle, narrow = much * model[3], much * model[4], much * model[5]
-            matte[light] = measured[light, p] - size * h * (broad * h7 + middle * h31 + narrow * h127)
-            by_h = 8 * broad * h7 + 32 * middle * h31 + 128 * narrow * h127
-            by_c = 1 - model[2] + 2 * model[0] * lit * c + model[1] * added_by_c
+            very_broad = lit * model[2] * (1.0 if on_paint else bright) * h ** (power - 1) if power > 0.0 else 0.0
+            matte[light] = measured[light, p] - size * h * (very_broad + broad * h7 + middle * h31 + narrow * h127)
+            by_h = power * very_broad + 8 * broad * h7 + 32 * middle * h31 + 128 * narrow * h127
+            by_c = 1 - soft + 2 * model[0] * lit * c + model[1] * added_by_c
             by_facing = model[1] * added_by_facing
-            shade = c + model[2] * (1 - c) + model[0] * lit * c * c + model[1] * added
+            shade = c + soft * (1 - c) + model[0] * lit * c * c + model[1] * added
             along = shade - by_c * c - by_h * h - by_facing * facing
             for i in range(3):
                 rows[light, i] = along * normal[i] + by_c * towards[light, p, i] + by_h * half[light, p, i]
