@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from ring_and_ball import ring
+from ring_and_ball import ball, ring
 
 from psvideo.model.surface import Surface
 from psvideo.solve.images import solve_images
@@ -165,6 +165,49 @@ def test_a_very_broad_sheen_is_not_taken_for_softness(ways: Array, power: int, m
     monkeypatch.setattr(reflectance_fit, "VERY_BROAD", ())
     soft = Solving(error=True).solve(pictures, under(ways), mask=inside)
     assert off_deg(soft, normals, inside).mean() > 1.2 * off.mean()
+
+
+def varnished(ways: Array, power: int, strength: float, curve: float) -> tuple[list[NDArray[np.float32]], Array]:
+    """Plates of a ball's front that fills the picture, of many paints that mirror alike, and its normals."""
+    normals, inside = ball(SIZE, reach_deg=70)
+    rng, plates = np.random.default_rng(4), []
+    paint = np.array([0.6, 0.45, 0.35]) * rng.uniform(0.5, 1.1, (SIZE // 8, SIZE // 8, 1)).repeat(8, 0).repeat(8, 1)
+    for way in ways:
+        cosine = np.maximum(normals @ way, 0)
+        plate = (cosine * (1 + curve * cosine))[..., None] * paint + sheen(normals, way, power, strength)[..., None]
+        plates.append(((plate + rng.normal(0, NOISE, paint.shape)) * inside[..., None]).astype(np.float32))
+    return plates, normals
+
+
+def test_lights_on_a_ring_do_not_take_a_very_broad_sheen_for_a_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = ring(6, 40)
+    plates, normals = varnished(ways, 2, 0.4, 0.0)
+    inside = np.linalg.norm(normals, axis=-1) > 0.5
+    found = Solving(error=True).solve(plates, under(ways), mask=inside)
+    assert found.misfit is not None
+    assert found.misfit.reflectance is None
+    assert found.error_deg is not None
+    assert (off_deg(found, normals, inside) <= 2 * found.error_deg[inside]).mean() > 0.9
+    monkeypatch.setattr(reflectance_fit, "ON_A_RING", 0.0)
+    curved = Solving(error=True).solve(plates, under(ways), mask=inside)
+    assert curved.error_deg is not None
+    assert (off_deg(curved, normals, inside) <= 2 * curved.error_deg[inside]).mean() < 0.8
+
+
+@pytest.mark.parametrize(("strength", "curve"), [(0.2, 0.0), (0.0, -0.25)], ids=["varnish", "flat"])
+def test_lights_on_a_ring_show_varnish_and_what_is_flat(strength: float, curve: float) -> None:
+    plates, _ = varnished(ring(6, 40), 8, strength, curve)
+    misfit = solve_images(plates, ring(6, 40)).misfit
+    assert misfit is not None
+    assert misfit.reflectance is not None
+    assert misfit.reflectance.curve == pytest.approx(curve, abs=0.1)
+    assert misfit.reflectance.broad == pytest.approx(strength, abs=0.03)
+
+
+def test_lights_at_two_slants_are_off_a_ring() -> None:
+    leaning = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]])
+    assert reflectance_fit.off_a_ring(ring(7, 40) @ leaning) < 1e-12
+    assert reflectance_fit.off_a_ring(UNEVEN) > 0.1
 
 
 def test_lights_that_are_off_do_not_make_a_matte_subject_soft() -> None:

@@ -38,8 +38,8 @@ ALTERNATIONS, SOLVED_AGAIN, REWEIGHTED = 4, 3, 4
 """How often model and normals follow each other, steps of the normals each time, and of the model's weights."""
 HOPELESS = 0.02
 """What explains no more at the second time is not looked at again."""
-NUMBERS, ROUGH, SOFT, SHINE = 6, 1, 2, 3
-"""The model's numbers, which of them are roughness and softness, and where highlights begin."""
+NUMBERS, CURVE, ROUGH, SOFT, SHINE = 6, 0, 1, 2, 3
+"""The model's numbers, which of them are curve, roughness and softness, and where highlights begin."""
 LESS_LEFT, MUCH_LESS_LEFT, FEW_LEAVE = 0.8, 0.65, 0.3
 """What roughness leaves at most of what is left without it, to count, and what softness does, under five lights too:
 under lights whose directions are wrong roughness explains a tenth, of clay half; softness explains a third of velvet,
@@ -59,6 +59,11 @@ all over it seems 1 to 1.2 times as soft."""
 MOST_AWAY = 0.02
 """What a camera sees faces it. Softness that is not there tilts normals until more of them than this face away (0.06 to
 0.15 of a glossy ball and a bear under six lights, whose normals it turned by 12 to 22 degrees; none of wax or skin)."""
+ON_A_RING = 0.02
+"""Lights that are so far off a ring, beside what they send, cannot show a curve (``off_a_ring``)."""
+LEAST_LOBES = 0.33
+"""Under them lobes must be this much of a curve that shows beside them, in albedos: of h^2 and h^3 they are 0 to 0.3,
+of h^4 0.2 to 0.5, of varnish more than 1."""
 PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3, 0.3, 0.3), 300.0
 """The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
@@ -77,7 +82,13 @@ class InPlace(NamedTuple):
     on_paint: bool = False
 
 
-SOFTNESS = InPlace()
+class Sought(NamedTuple):
+    """What kind of model is sought, and what stands in softness' place in it."""
+
+    kind: Kind = "shining"
+    in_place: InPlace = InPlace()
+
+
 VERY_BROAD = (InPlace(2, True), InPlace(2), InPlace(3, True), InPlace(3), InPlace(1.5, True))
 """Sheens so broad that they look like softness: both brighten what hardly faces the lights, but the one turns normals
 by 3 to 10 degrees where the other does not. Softness has to explain more than each of these."""
@@ -168,13 +179,30 @@ def _of_all(points: SubjectPoints) -> Reflectance | None:
     typical, few = median(sizes[known]), len(points.measured) < FOR_SHINE
     kind, best = "shining", alternated(points, g, typical)
     for other in _to_try(points):
-        found = alternated(points, g, typical, other)
+        found = alternated(points, g, typical, Sought(other))
         if _leaves_less(found, best, other, few=few) and (other == "rough" or _is_soft(points, g, found, best)):
             kind, best = other, found
-    if best.explained < (FEW_EXPLAIN if few else LEAST_EXPLAINED) or (few and kind == "shining"):
+    if best.explained < (FEW_EXPLAIN if few else LEAST_EXPLAINED):
+        return None
+    if kind == "shining" and (few or _ring_hides(points, best)):
         return None
     of_albedo, lobes = best.model[:SHINE], best.model[SHINE:] * typical
     return Reflectance(*(float(each) for each in (*of_albedo, *lobes)))
+
+
+def _ring_hides(points: SubjectPoints, found: ModelFollowed) -> bool:
+    """Whether what shines is mostly a curve above 0, and the lights stand on a ring: these cannot tell it from a very
+    broad sheen, which turns normals to the other side."""
+    curve, lobes = found.model[CURVE], found.model[SHINE:].sum()
+    return bool(lobes < LEAST_LOBES * curve and off_a_ring(points.towards.mean(axis=1)) < ON_A_RING)
+
+
+def off_a_ring(directions: Doubles) -> float:
+    """Return how far lights (light, 3) are from a ring, on which one vector sends as much to all of them: what the best
+    such vector is off by, root mean square; 0.1 to 0.2 where they stand at two slants."""
+    alike = np.ones(len(directions))
+    vector = np.linalg.lstsq(directions, alike, rcond=None)[0]
+    return float(np.sqrt(np.mean((directions @ vector - alike) ** 2)))
 
 
 def _to_try(points: SubjectPoints) -> tuple[Literal["rough", "soft"], ...]:
@@ -196,7 +224,7 @@ def _is_soft(points: SubjectPoints, g: Doubles, found: ModelFollowed, before: Mo
     if not _faces_it(points, found.g, before.g):
         return False
     typical = median(np.linalg.norm(g, axis=1))
-    shining = (alternated(points, g, typical, "soft", in_place=one) for one in VERY_BROAD)
+    shining = (alternated(points, g, typical, Sought("soft", one)) for one in VERY_BROAD)
     return all(found.explained > one.explained for one in shining)
 
 
@@ -213,20 +241,20 @@ def sizes_of(points: SubjectPoints) -> Doubles:
 
 
 def alternated(
-    points: SubjectPoints, g: Doubles, typical: float, kind: Kind = "shining", *,
-    turns: int = ALTERNATIONS, least: float = -np.inf, in_place: InPlace = SOFTNESS,
+    points: SubjectPoints, g: Doubles, typical: float, sought: Sought = Sought(), *,
+    turns: int = ALTERNATIONS, least: float = -np.inf,
 ) -> ModelFollowed:  # fmt: skip
     """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
-    than the ``least``. What is ``in_place`` of softness has its number, and takes the place in what is soft."""
+    than the ``least``."""
     points, nothing = points.in_order(), ModelFollowed(np.zeros(NUMBERS), 0.0, g)
     model, explained = np.zeros(NUMBERS), 0.0
     for turn in range(turns):
-        model, explained = _model(points, g, typical, kind, in_place)
-        absent = kind in OF_KIND and not model[OF_KIND[kind]]
+        model, explained = _model(points, g, typical, sought)
+        absent = sought.kind in OF_KIND and not model[OF_KIND[sought.kind]]
         if (turn and explained < HOPELESS) or absent or explained <= least:
             return nothing
         for _ in range(SOLVED_AGAIN):
-            g = _solved_again(points, g, model, typical, in_place)
+            g = _solved_again(points, g, model, typical, sought.in_place)
     return ModelFollowed(model, explained, g)
 
 
@@ -258,7 +286,7 @@ def _medians(values: Doubles, counts: Mask) -> Doubles:
     return np.where(number > 0, (lower + upper) / 2, 0.0)
 
 
-def _parts(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlace = SOFTNESS) -> Doubles:
+def _parts(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlace = InPlace()) -> Doubles:
     """Return what was measured, in albedos, and what each number of the model would add, (part, light, point)."""
     from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
 
@@ -276,14 +304,14 @@ def _left(points: SubjectPoints, weights: Doubles, parts: Doubles) -> Doubles:
     return left
 
 
-def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind, in_place: InPlace) -> tuple[Doubles, float]:
+def _model(points: SubjectPoints, g: Doubles, typical: float, sought: Sought) -> tuple[Doubles, float]:
     """Return the numbers of the model, and the share of the squares of what is left over that it explains.
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
     """
     from psvideo.solve.normals.robust.reflectance_kernel import add_squares
 
-    parts = _parts(points, g, typical, in_place)
+    parts = _parts(points, g, typical, sought.in_place)
     weights, model, spread = points.counts, np.zeros(NUMBERS), 1.0
     left, square, right = parts, np.empty((NUMBERS, NUMBERS)), np.empty(NUMBERS)
     for turn in range(REWEIGHTED):
@@ -293,7 +321,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind, in_pla
         spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), 1e-4)
         per = COUNTED / spread**2 / points.counts.sum()
         add_squares(weights, left, square, right)
-        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, kind, in_place)
+        model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, sought)
         rest = own - np.tensordot(model, others, axes=1)
         if turn < REWEIGHTED - 1:
             weights = points.counts / (1 + (rest / (MODEL_WIDTH * spread)) ** 2)
@@ -301,16 +329,17 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, kind: Kind, in_pla
     return model, 1 - after / max(before, 1e-30)
 
 
-def _bounded(square: Doubles, right: Doubles, kind: Kind, in_place: InPlace) -> Doubles:
+def _bounded(square: Doubles, right: Doubles, sought: Sought) -> Doubles:
     """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, what is
     rough is not dark under grazing light as well, and what is soft has no curve of its own."""
     from psvideo.solve.normals.robust.reflectance_kernel import descend_within
 
     least, most = np.array((-MOST_CURVE, *(0.0,) * 5)), np.array((MOST_CURVE, 0.0, 0.0, *(MOST_LOBE,) * 3))
-    if kind == "rough":
-        most[0], most[ROUGH] = 0.0, MOST_ROUGH
-    elif kind == "soft":
-        least[0], most[0], most[SOFT] = 0.0, 0.0, MOST_LOBE if in_place.power else MOST_SOFT
+    if sought.kind == "rough":
+        most[CURVE], most[ROUGH] = 0.0, MOST_ROUGH
+    elif sought.kind == "soft":
+        least[CURVE], most[CURVE] = 0.0, 0.0
+        most[SOFT] = MOST_LOBE if sought.in_place.power else MOST_SOFT
     found = np.empty(NUMBERS)
     descend_within(square, right, least, most, found)
     return found

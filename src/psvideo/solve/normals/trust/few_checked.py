@@ -26,6 +26,7 @@ from psvideo.solve.normals.robust.reflectance_fit import (
     ROUGH,
     SOFT,
     Kind,
+    Sought,
     SubjectPoints,
     alternated,
     explained_evenly,
@@ -84,7 +85,7 @@ def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
     sizes, most, left = np.linalg.norm(g, axis=1), np.zeros(len(g)), 1.0
     typical = median(sizes)
     for kind in get_args(Kind):
-        one = alternated(points, g, typical, kind, turns=TURNS, least=LEAST_EXPLAINED)
+        one = alternated(points, g, typical, Sought(kind), turns=TURNS, least=LEAST_EXPLAINED)
         holds = _beyond(explained_evenly(points, g, typical, one.model), LEAST_EVENLY)
         holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if kind == "rough" else 1.0
         if kind == "soft":  # the last: it must leave much less than the others, or lights that are off look like it
