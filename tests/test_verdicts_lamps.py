@@ -24,6 +24,7 @@ from judged_footage import (
 
 from psvideo.model.camera import Encoding
 from psvideo.model.swing import Swing
+from psvideo.model.timing import Flash
 from psvideo.report.judge import of_accuracy
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
@@ -245,6 +246,19 @@ def test_no_lamp_is_blamed_for_what_whole_frames_do() -> None:
     assert (untimed.subject, untimed.grade) == ("lights", "doubtful")
     timing = timing_of(phase_error_rows=1.0, swing=camera)
     assert "exposure and gain first" in next(timing_and_order(timing, "rolling")).advice
+
+
+def test_a_dark_slot_is_not_asked_for_where_the_plan_has_one() -> None:
+    """A lamp that never fires looks as dark, so that nobody knows which of the two slots it is."""
+    lit, dark = (
+        Flash(index=n, slot=n, lights=lights, start_s=0.01 * n, duration_s=1e-3, complete=True)
+        for n, lights in enumerate(({"a": 1.0}, {}))
+    )
+    for flashes, word in (((lit,), "Shoot with a dark slot"), ((lit, dark), "every light fires")):
+        *_, order = timing_and_order(timing_of(order="guess", flashes=flashes), "rolling")
+        assert (order.grade, order.subject) == ("doubtful", "order")
+        assert word in order.advice
+        assert ("Shoot" in order.advice) is (len(flashes) == 1)
 
 
 @pytest.mark.parametrize(("by", "word"), [(0.25, "grows by 2"), (-0.2, "fades by 1"), (0.03, "")])

@@ -14,6 +14,11 @@ CHECK_PLAN = (
     "like another exposure. Fix the exposure, and switch stabilisation off."
 )
 GAIN_FIRST = "Fix the camera's exposure and gain first (see the line on gain): that frames change costs most of this."
+MARK_IT = "Shoot with a dark slot as marker, or name the first light with `first_light`."
+DARK_HIDDEN = (
+    "The plan has a dark slot, and the picture does not show which one it is: see that every light fires, for one that "
+    "gives no light looks as dark. Or name the first light with `first_light`."
+)
 
 
 def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
@@ -44,7 +49,7 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
             grade="doubtful",
             found="Which light is which is a guess, so normals may be wrong everywhere."
             + (f" {timing.order_note}" if timing.order_note else ""),
-            advice="Shoot with a dark slot as marker, or name the first light with `first_light`.",
+            advice=DARK_HIDDEN if any(flash.is_dark for flash in timing.flashes) else MARK_IT,
         )
     else:
         yield Judgement(subject="order", grade="good", found=ORDER[timing.order])
