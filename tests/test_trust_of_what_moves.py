@@ -62,6 +62,22 @@ def test_what_tumbles_faster_than_can_be_followed_is_not_taken_for_clay(subject:
     assert off_deg[shown].mean() < plain_deg[shown].mean() + 0.5
 
 
+def test_what_moves_is_trusted_up_to_seven_degrees_and_what_stands_up_to_five() -> None:
+    clip = filmed(5, turn(4, ASLANT), noise=NOISE, subject=BUST)
+    surface, off_deg = judged(clip, Aligning())
+    motion = clip.shown(Aligning())[1].motion
+    assert motion is not None
+    assert motion.step == 1
+    assert surface.error_deg is not None
+    error = surface.error_deg.astype(np.float32)
+    trusted = (error > 0) & (error <= np.where(motion.moves, np.float32(7), np.float32(5)))
+    assert np.array_equal(surface.valid, trusted)
+    more = surface.valid & (error > 5)
+    assert more.sum() > 200
+    assert off_deg[more].mean() < 7.0
+    assert (off_deg[surface.valid & motion.moves] > FAR_OFF_DEG).mean() < 0.03
+
+
 PITCH_S, WAVE_PX, WAVE_PER_S, HEIGHT_PX = 0.01, 60.0, 9.0, 8.0
 DIRECTIONS = np.array([[0.61, 0.19, 0.766], [-0.47, 0.43, 0.766], [-0.14, -0.63, 0.766]])
 

@@ -213,7 +213,8 @@ def trust_note(method: Method, lights: int) -> str:
     """Return in one sentence what a valid normal of this solver and this many lights can be relied on for."""
     how = Judging()
     trusted = (
-        f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees. "
+        f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees, "
+        f"{how.most_moving_error_deg:g} where it moves. "
         "Where rig or surface spoil all pixels alike, the judgement of accuracy says so. "
     )
     if lights == 3:

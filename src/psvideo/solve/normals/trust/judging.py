@@ -6,11 +6,13 @@ surface (``doubting``) what it cannot.
 
 from dataclasses import dataclass, field, replace
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, lie_in_files
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import MEASURED, Misfit, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
@@ -33,11 +35,14 @@ class Judging:
 
     most_error_deg: a normal is trusted where its predicted error is at most this: of such normals at most one in forty
         is off by more than 10 degrees, under 5 to 8 lights one in twenty.
+    most_moving_error_deg: the same where something was followed: holes cost more there, and of such normals one in
+        seventy is off by more than 10 degrees.
     spreading: what noise and residuals say of a normal.
     doubting, moving: what may turn normals beyond that, and where things move.
     """
 
     most_error_deg: float = 5.0
+    most_moving_error_deg: float = 7.0
     spreading: Spreading = field(default_factory=Spreading)
     doubting: Doubting = field(default_factory=Doubting)
     moving: MovingDoubt = field(default_factory=MovingDoubt)
@@ -77,9 +82,17 @@ def judged(
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, shown.usual_deg])
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
+    if one.moved and one.moves is not None and one.moves.any():
+        trusted |= _trusted_moving(error, one.moves, how.most_moving_error_deg)
     slope_deg = _usual(shown.by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
     lit = shown.shadows_lit
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg, shadows_lit=lit), doubts
+
+
+def _trusted_moving(error: NDArray[np.floating], moves: Mask, limit_deg: float) -> Mask:
+    """Return what was solved within the limit and moves, of ``moves`` on a grid of its own, (row, col)."""
+    grown = cv2.resize(moves.view(np.uint8), error.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    return np.asarray(grown & (error > 0) & (error <= error.dtype.type(limit_deg)))
 
 
 def _found(points: ThinSurface, one: Evidence, noise: PlateNoise, how: Judging) -> tuple[Doubt, Floats | None]:
