@@ -14,11 +14,11 @@ import numpy as np
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Doubles, Flags, Floats
 from psvideo.plates.align.as_they_are import Lamps
-from psvideo.plates.align.velocity.all_lights import AllLights
+from psvideo.plates.align.velocity.all_lights import FINE_PX, WINDOW_PX, AllLights
 from psvideo.plates.align.velocity.brightness import light_of
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, odd_width
-from psvideo.plates.align.velocity.moving import FINE_PX, GROWN, GROWN_PX, WINDOW_PX
+from psvideo.plates.align.velocity.moving import GROWN, GROWN_PX
 from psvideo.plates.align.velocity.moving_kernel import moved_rows
 
 MATTE = np.float32(0.05)

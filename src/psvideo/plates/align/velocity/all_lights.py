@@ -31,6 +31,9 @@ FAR = 2
 COARSE = 2
 """Sketches of FINE_PIXELS and more get a velocity in every second row and column: flow is no finer there."""
 BAND_PIXELS = 1 << 14
+WINDOW_PX, FINE_PX = 9, 3
+"""A velocity is tested over the first window; over the second, a smaller one, rest must not explain the plates
+better."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +88,11 @@ class AllLights:
 
         over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
         return out
+
+    def unlike_over_windows(self, velocity: Floats) -> tuple[Floats, Floats]:
+        """Return how unlike plates are along velocities over both windows, a wide and a fine one, (row, col)."""
+        unlike = self.unlike(velocity)
+        return self.mean(unlike, WINDOW_PX), self.mean(unlike, FINE_PX)
 
     def stays(self, velocity: Floats) -> Flags:
         """Return what is within the picture at both ends of its way: the rest is hidden in one plate of every light."""

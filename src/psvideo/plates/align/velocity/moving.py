@@ -13,14 +13,12 @@ import cv2
 import numpy as np
 
 from psvideo.model.arrays import Flags, Floats
-from psvideo.plates.align.velocity.all_lights import AllLights
+from psvideo.plates.align.velocity.all_lights import FINE_PX, WINDOW_PX, AllLights
 from psvideo.plates.align.velocity.between_lights import BetweenLights
 from psvideo.plates.align.velocity.flow import pixel_places
 from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, odd_width
+from psvideo.plates.align.velocity.plane_fits import fitted_by_planes
 
-WINDOW_PX, FINE_PX = 9, 3
-"""A velocity is tested over the first window; over the second, a smaller one, rest must not explain the plates
-better."""
 EXPLAINED, MARGIN, GAIN = 0.65, 0.05, 0.25
 """A velocity is accepted where what it leaves unexplained is below the first (a share of what rest leaves) less the
 second, or below what rest leaves by the third; the second and third count once for every light."""
@@ -59,8 +57,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose
     lights = AllLights.of(pairs, time_s)
     between = BetweenLights.of(lights.codes, lights.spans_s, lights.shape)
     none = np.zeros((2, *lights.shape), np.float32)
-    rest = lights.unlike(none)
-    wide_rest, fine_rest = lights.mean(rest, WINDOW_PX), lights.mean(rest, FINE_PX)
+    wide_rest, fine_rest = lights.unlike_over_windows(none)
     proposals = lights.proposed()
     chosen = _best(lights, between, proposals, wide_rest)
     velocity, best, fine = chosen.velocity, chosen.wide, lights.mean(chosen.unlike, FINE_PX)
@@ -82,7 +79,9 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose
         unchanged=np.where(moves, np.int16(0), unchanged),
         step=lights.step,
     )
-    return found if choose is None else choose(lights, proposals, found, ~stirs)
+    if choose is not None:
+        found = choose(lights, proposals, found, ~stirs)
+    return fitted_by_planes(lights, found, ~stirs, (wide_rest, fine_rest))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,8 +149,7 @@ def _grown(
     near = np.empty_like(velocity)
     for plane, own in zip(near, velocity, strict=True):
         plane[:] = mean_over(own * moves, size) / np.maximum(around, LEAST)
-    unlike = lights.unlike(near)
-    wide, fine = lights.mean(unlike, WINDOW_PX), lights.mean(unlike, FINE_PX)
+    wide, fine = lights.unlike_over_windows(near)
     rests = _clearly(rest[0], wide, lights.count)
     most = around - mean_over(rests.astype(np.float32), size)
     half = np.float32(lights.spans_s.sum(axis=1).mean() / 2) * near
