@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from psvideo.plates.align.doubt.own_means import own_mean
-from psvideo.plates.align.velocity import moving
+from psvideo.plates.align.velocity import moving, plane_fits
 from psvideo.plates.align.velocity.flow import Sketch, sketch_of
 from psvideo.plates.align.velocity.followed import Pair
 from psvideo.plates.align.velocity.moving import followed_at
@@ -45,4 +45,5 @@ def test_what_is_bare_follows_what_moves_around_it(monkeypatch: pytest.MonkeyPat
     assert not found.moves[wall].any()
     assert np.abs(found.velocity[0][inner] - STEP_PX).mean() < 0.3
     monkeypatch.setattr(moving, "GROWN", 0)
+    monkeypatch.setattr(plane_fits, "JOINED", 0)
     assert followed_at(pairs, 1.0).moves[inner].mean() < 0.96

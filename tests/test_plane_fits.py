@@ -75,7 +75,7 @@ def _beside(rests: np.ndarray, still: np.ndarray) -> Followed:
     moves = COL < 40
     found = Followed(time_s=1.0, velocity=EVEN * moves, moves=moves, rests=rests, unchanged=np.full(SHAPE, 3, np.int16))
     nothing = np.zeros(SHAPE, np.float32)
-    return fitted_by_planes(AllLights.of(pairs, 1.0), found, still, (nothing, nothing))
+    return fitted_by_planes(AllLights.of(pairs, 1.0), found, sure=moves & False, apart=still, rest=(nothing, nothing))
 
 
 def test_what_is_undecided_beside_what_moves_joins_and_what_rests_or_is_still_does_not() -> None:
@@ -89,3 +89,16 @@ def test_what_is_undecided_beside_what_moves_joins_and_what_rests_or_is_still_do
     for stays in (_beside(below, nowhere), _beside(nowhere, below)):
         assert not stays.moves[31:, 40:].any()
         assert stays.moves[20:30, 40:42].all()
+
+
+def test_velocities_that_are_sure_stay_as_they_are() -> None:
+    pairs = [
+        Pair(before=_sketch(_grain(3)[:, :80], light, 0), after=_sketch(_grain(3)[:, :80], light, 2))
+        for light in range(3)
+    ]
+    lights, moves, nothing = AllLights.of(pairs, 1.0), np.ones(SHAPE, np.bool_), np.zeros(SHAPE, np.float32)
+    odd = np.where((ROW + COL) % 2 > 0, np.float32(1), np.float32(-1)) * np.ones((2, 1, 1), np.float32)
+    found = Followed(time_s=1.0, velocity=odd, moves=moves, rests=~moves)
+    made = fitted_by_planes(lights, found, sure=UPPER, apart=~moves, rest=(nothing, nothing)).velocity
+    np.testing.assert_array_equal(made[:, UPPER], odd[:, UPPER])
+    assert np.abs(made[:, ~UPPER]).mean() < 0.3

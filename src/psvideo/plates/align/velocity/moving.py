@@ -65,11 +65,13 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose
     stirs = ~lights.at_rest(unchanged, others)
     moves = _clearly(best, wide_rest, lights.count) & (fine < np.float32(FINE_EXPLAINED) * fine_rest) & stirs
     rested = between.disagree(none, REFUTED_PX)
-    moves &= ~_refuted(rested, between.disagree(velocity, REFUTED_PX))
+    refuted = _refuted(rested, between.disagree(velocity, REFUTED_PX))
+    moves &= ~refuted
     rests = np.zeros_like(moves)
     for _ in range(GROWN):
         moves, rests = _grown(lights, moves, velocity, (wide_rest, fine_rest), stirs)
-    moves &= ~_refuted(rested, between.disagree(velocity, REFUTED_PX))
+    refuted |= _refuted(rested, between.disagree(velocity, REFUTED_PX))
+    moves &= ~refuted
     velocity *= moves
     found = Followed(
         time_s=time_s,
@@ -79,9 +81,9 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose
         unchanged=np.where(moves, np.int16(0), unchanged),
         step=lights.step,
     )
-    if choose is not None:
-        found = choose(lights, proposals, found, ~stirs)
-    return fitted_by_planes(lights, found, ~stirs, (wide_rest, fine_rest))
+    told = found if choose is None else choose(lights, proposals, found, ~stirs)
+    sure = np.any(told.velocity != found.velocity, axis=0)
+    return fitted_by_planes(lights, told, sure=sure, apart=~stirs | refuted, rest=(wide_rest, fine_rest))
 
 
 @dataclass(frozen=True, kw_only=True)

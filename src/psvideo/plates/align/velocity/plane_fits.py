@@ -26,16 +26,22 @@ LEAST, LEAST_SPREAD = 1e-9, 1e-3
 """Windows of one pixel, or of a line, get a plane without a slope across."""
 
 
-def fitted_by_planes(lights: AllLights, found: Followed, still: Flags, rest: tuple[Floats, Floats]) -> Followed:
+def fitted_by_planes(
+    lights: AllLights, found: Followed, *, sure: Flags, apart: Flags, rest: tuple[Floats, Floats]
+) -> Followed:
     """Return what was ``found`` with velocities of planes where plates are as alike along them, and with what is
-    undecided beside it. What is ``still`` (row, col) stays; ``rest`` is how unlike plates are at rest, over a wide and
-    a fine window, (row, col)."""
+    undecided beside it.
+
+    What is ``sure`` (row, col) keeps its velocity, and what is ``apart`` (row, col) joins nothing. ``rest`` is how
+    unlike plates are at rest, over a wide and a fine window, (row, col).
+    """
     if not found.moves.any():
         return found
-    velocity, moves = _evened(lights, found.velocity, found.moves), found.moves
+    moves = found.moves
+    velocity = _evened(lights, found.velocity, moves, moves & ~sure)
     for _ in range(JOINED):
         plane, around = planes_through(velocity, moves, odd_width(PLANE_PX, lights.step))
-        joins = (around > ENOUGH) & ~moves & ~found.rests & ~still
+        joins = (around > ENOUGH) & ~moves & ~found.rests & ~apart
         for along, resting in zip(lights.unlike_over_windows(plane), rest, strict=True):
             joins &= along <= AS_REST * resting
         velocity, moves = np.where(joins, plane, velocity), moves | joins
@@ -44,10 +50,10 @@ def fitted_by_planes(lights: AllLights, found: Followed, still: Flags, rest: tup
     )
 
 
-def _evened(lights: AllLights, velocity: Floats, moves: Flags) -> Floats:
-    """Return the velocity of what ``moves`` with planes' where plates are as alike along them."""
+def _evened(lights: AllLights, velocity: Floats, moves: Flags, asked: Flags) -> Floats:
+    """Return the velocity of what ``moves`` with planes', where that is ``asked`` and plates are as alike."""
     plane, _ = planes_through(velocity, moves, odd_width(PLANE_PX, lights.step))
-    taken = moves.copy()
+    taken = asked.copy()
     for along, own in zip(lights.unlike_over_windows(plane), lights.unlike_over_windows(velocity), strict=True):
         taken &= along <= AS_OWN * own
     return np.where(taken, plane, velocity)
