@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.velocity import moving, plane_fits
 from psvideo.plates.align.velocity.all_lights import AllLights
 from psvideo.plates.align.velocity.flow import Sketch, sketch_of
@@ -68,27 +68,35 @@ def test_two_things_that_pass_each_other_keep_their_own_velocities(monkeypatch: 
     assert off_px() > 0.7, "planes across the seam are of neither"
 
 
-def _beside(rests: np.ndarray, still: np.ndarray) -> Followed:
-    """What is made of a bare picture whose left half was found to move."""
+ALONG = np.stack([0 * COL, 1 + 0.05 * COL]).astype(np.float32)
+NOWHERE = np.zeros(SHAPE, np.bool_)
+
+
+def _beside(velocity: Floats, rests: Flags = NOWHERE, apart: Flags = NOWHERE) -> Followed:
+    """What is made of a bare picture whose left part was found to move."""
     even = np.full(SHAPE, 0.5, np.float32)
     pairs = [Pair(before=_sketch(even, light, 0), after=_sketch(even, light, 2)) for light in range(3)]
-    moves = COL < 40
-    found = Followed(time_s=1.0, velocity=EVEN * moves, moves=moves, rests=rests, unchanged=np.full(SHAPE, 3, np.int16))
-    nothing = np.zeros(SHAPE, np.float32)
-    return fitted_by_planes(AllLights.of(pairs, 1.0), found, sure=moves & False, apart=still, rest=(nothing, nothing))
+    moves, nothing = np.less(COL, 40), np.zeros(SHAPE, np.float32)
+    unchanged = np.full(SHAPE, 3, np.int16)
+    found = Followed(time_s=1.0, velocity=velocity * moves, moves=moves, rests=rests, unchanged=unchanged)
+    return fitted_by_planes(AllLights.of(pairs, 1.0), found, sure=NOWHERE, apart=apart, rest=(nothing, nothing))
 
 
-def test_what_is_undecided_beside_what_moves_joins_and_what_rests_or_is_still_does_not() -> None:
-    nowhere, below = np.zeros(SHAPE, np.bool_), ROW > 30
-    joined = _beside(nowhere, nowhere)
+def test_what_is_undecided_beside_what_moves_joins_and_what_rests_or_is_apart_does_not() -> None:
+    joined, below = _beside(ALONG), np.greater(ROW, 30)
     beside = np.s_[20:40, 40:42]
     assert joined.moves[beside].all()
-    np.testing.assert_allclose(joined.velocity[:, 20:40, 40:42], EVEN[:, 20:40, 40:42], atol=0.05)
+    np.testing.assert_allclose(joined.velocity[:, 20:40, 40:42], ALONG[:, 20:40, 40:42], atol=0.05)
     assert not joined.unchanged[joined.moves].any()
     assert not joined.moves[:, 60:].any()
-    for stays in (_beside(below, nowhere), _beside(nowhere, below)):
+    for stays in (_beside(ALONG, rests=below), _beside(ALONG, apart=below)):
         assert not stays.moves[31:, 40:].any()
-        assert stays.moves[20:30, 40:42].all()
+        assert stays.moves[12:18, 40:42].all()
+
+
+def test_what_lies_before_or_behind_what_moves_does_not_go_along() -> None:
+    across = np.stack([6 + 0 * COL, 0 * COL]).astype(np.float32)
+    assert not _beside(across).moves[:, 40:].any()
 
 
 def test_velocities_that_are_sure_stay_as_they_are() -> None:

@@ -103,6 +103,12 @@ class AllLights:
                 within &= (ends >= 0) & (ends <= size - 1)
         return within
 
+    def least_at_ends(self, values: Floats, velocity: Floats) -> Floats:
+        """Return the least of what values (row, col) are half a round before and behind every pixel, along velocities:
+        what moves goes on there, and what it hides does not."""
+        half = np.float32(self.spans_s.sum(axis=1).mean() / 2) * velocity
+        return np.minimum(_shifted(values, half), _shifted(values, -half))
+
     def unchanged(self) -> NDArray[np.int16]:
         """Return under how many lights every pixel shows the same at rest, shape (row, col)."""
         rows, cols = (length * self.step for length in self.shape)
@@ -158,3 +164,9 @@ class AllLights:
 
 def _spread(count: int, most: int) -> list[int]:
     return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
+
+
+def _shifted(values: Floats, way: Floats) -> Floats:
+    x, y = pixel_places(*values.shape)
+    x, y = x + way[0], y + way[1]
+    return np.asarray(cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)

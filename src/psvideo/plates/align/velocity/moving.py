@@ -9,13 +9,11 @@ nothing explains much more than rest does: flow that fits shadows and shading of
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.velocity.all_lights import FINE_PX, WINDOW_PX, AllLights
 from psvideo.plates.align.velocity.between_lights import BetweenLights
-from psvideo.plates.align.velocity.flow import pixel_places
 from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, odd_width
 from psvideo.plates.align.velocity.plane_fits import fitted_by_planes
 
@@ -154,15 +152,7 @@ def _grown(
     wide, fine = lights.unlike_over_windows(near)
     rests = _clearly(rest[0], wide, lights.count)
     most = around - mean_over(rests.astype(np.float32), size)
-    half = np.float32(lights.spans_s.sum(axis=1).mean() / 2) * near
-    ends = np.minimum(_shifted(most, half), _shifted(most, -half))
     joins = (most > 0) & (fine < rest[1] + np.float32(MARGIN * lights.count)) & stirs & ~moves & ~rests
-    joins &= (wide <= np.float32(UNEXPLAINED * lights.count)) | (ends > MOST)
+    joins &= (wide <= np.float32(UNEXPLAINED * lights.count)) | (lights.least_at_ends(most, near) > MOST)
     np.copyto(velocity, near, where=joins)
     return moves | joins, rests
-
-
-def _shifted(values: Floats, way: Floats) -> Floats:
-    x, y = pixel_places(*values.shape)
-    x, y = x + way[0], y + way[1]
-    return np.asarray(cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)

@@ -11,7 +11,7 @@ import numpy as np
 
 from psvideo.model.arrays import Doubles, Flags, Floats
 from psvideo.plates.align.velocity.all_lights import AllLights
-from psvideo.plates.align.velocity.followed import Followed, odd_width
+from psvideo.plates.align.velocity.followed import Followed, mean_over, odd_width
 
 PLANE_PX = 15
 """Planes are fitted over windows of so many pixels of the sketches."""
@@ -20,8 +20,9 @@ AS_OWN = np.float32(1.2)
 either window: two things that pass each other lie in no plane."""
 JOINED, ENOUGH = 2, np.float32(0.3)
 """So often, what is undecided joins, where more than the second of its window moves."""
-AS_REST = np.float32(1.3)
-"""It joins where plates are at most so many times as unlike along the plane as at rest."""
+AS_REST, AMIDST = np.float32(1.3), np.float32(0.2)
+"""It joins where plates are at most so many times as unlike along the plane as at rest, and where before and behind it
+what moves exceeds what rests by the second, in shares of the window: what is hidden there belongs to what rests."""
 LEAST, LEAST_SPREAD = 1e-9, 1e-3
 """Windows of one pixel, or of a line, get a plane without a slope across."""
 
@@ -39,11 +40,14 @@ def fitted_by_planes(
         return found
     moves = found.moves
     velocity = _evened(lights, found.velocity, moves, moves & ~sure)
+    size = odd_width(PLANE_PX, lights.step)
+    resting_share = mean_over(found.rests.astype(np.float32), size)
     for _ in range(JOINED):
-        plane, around = planes_through(velocity, moves, odd_width(PLANE_PX, lights.step))
+        plane, around = planes_through(velocity, moves, size)
         joins = (around > ENOUGH) & ~moves & ~found.rests & ~apart
         for along, resting in zip(lights.unlike_over_windows(plane), rest, strict=True):
             joins &= along <= AS_REST * resting
+        joins &= lights.least_at_ends(around - resting_share, plane) > AMIDST
         velocity, moves = np.where(joins, plane, velocity), moves | joins
     return replace(
         found, velocity=velocity * moves, moves=moves, unchanged=np.where(moves, np.int16(0), found.unchanged)
