@@ -12,6 +12,7 @@ from written_movies import grey_ramp, in_10_bits, make_frame, write_movie
 
 from psvideo.clip import open_clip, read_frames
 from psvideo.clip.decode.movies import ffmpeg_planes, movie, yuv
+from psvideo.clip.decode.movies.movie_tags import compression_warning
 from psvideo.clip.decode.movies.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.export.preview_movie import write_movie as write_preview
 
@@ -214,3 +215,11 @@ def test_levels_at_the_ends_of_video_range_mean_what_leaving_them_out_means(
     write_movie(tmp_path / "x.mkv", grey_ramp(2), matrix=1, color_range=1)
     clip = open_clip(tmp_path / "x.mkv", plan=written_plan(rows=32, cols=48, black_level=black, white_level=white))
     assert next(iter(read_frames(clip))).image[0, 0, 0] == pytest.approx((40 - 16) / 219, abs=5e-5)
+
+
+def test_ten_bits_are_not_asked_for_of_a_movie_that_has_them() -> None:
+    ten, eight = (compression_warning("hevc", bits, frames=24, whole_frames=1) for bits in (10, 8))
+    assert ten is not None
+    assert eight is not None
+    assert "record only whole frames" in ten
+    assert "record 10 bits and only whole frames" in eight

@@ -97,7 +97,8 @@ def compression_warning(codec: str, bits: int, *, frames: int, whole_frames: int
     if chained:
         whole = "is a whole one" if whole_frames == 1 else "are whole ones"
         costs.append(f"of {frames} frames only {whole_frames} {whole}, the others are coded as changes")
+    better = "10 bits and only whole frames" if few else "only whole frames"
     return (
-        f"{SPOKEN.get(codec, codec)} costs accuracy: {', and '.join(costs)}. Where the camera can, record 10 bits and "
-        "only whole frames (ProRes, DNxHR, All-Intra), or raw"
+        f"{SPOKEN.get(codec, codec)} costs accuracy: {', and '.join(costs)}. Where the camera can, record {better} "
+        "(ProRes, DNxHR, All-Intra), or raw"
     )
