@@ -78,8 +78,8 @@ def _not_followed(share: float, *, aligned: bool, opened: bool) -> Judgement:
         "repeats itself meanwhile"
         + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else ".")
         + (" The open shutter shows the single flashes there, and no blur between them." if opened else ""),
-        advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers, or the "
-        "movie's coding changes the pictures.",
+        advice="Where things move: move slower, raise the frame rate, or flash fewer lights. Where nothing does, light "
+        "flickers, or the movie's coding changes the pictures: record at a higher bit rate.",
     )
 
 
