@@ -138,8 +138,8 @@ def _verdict(fits: list[_Fit], own_deg: float) -> RigTurn:
     if any(fit.rig_error_deg < doubt_deg * (1 + CLEARLY / np.sqrt(fit.freedom)) for fit in fits[1:]):
         return RigTurn(
             turn=None,
-            why=f"{compared} and by {second.rig_error_deg:.1f} in the next best, which is no clear difference for a rig "
-            f"that may be off by {doubt_deg:.0f} by itself: it looks nearly the same when it is turned",
+            why=f"{compared} and by {second.rig_error_deg:.1f} in the next best, which is no clear difference for a "
+            f"rig that may be off by {doubt_deg:.0f} by itself: it looks nearly the same when it is turned",
         )
     return RigTurn(turn=best.turn, why=f"{compared}, and by {second.rig_error_deg:.0f} in the next best")
 

@@ -69,7 +69,8 @@ def by_slope_deg(
     bright = in_light_of_all(normals, albedo, lit, whole)
     if not bright.any():
         return None
-    pairs = pairs_of(normals, without_edges(points.brightness, known), painted(points, known, AVERAGED), bright)
+    lengths, paint = without_edges(points.brightness, known), painted(points, known, AVERAGED)
+    pairs = pairs_of(normals, lengths, paint, bright)
     if pairs is None:
         return None
     pairs = _without_paint(pairs, lit)

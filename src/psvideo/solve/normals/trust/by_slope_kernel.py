@@ -12,6 +12,8 @@ ZERO, ONE = np.float32(0), np.float32(1)
 SUMMED = 6
 """What is averaged: three numbers of a normal times albedo, albedo and its square, and whether a point is known."""
 WHOLE, TINY = np.float32(0.999), np.float32(1e-12)
+SMOOTH = np.float32(0.98)
+"""Where normals of a square are so much shorter in the mean, by their albedo, a crease goes through it."""
 
 
 @FUSED.kept
@@ -34,7 +36,7 @@ def fill_averaged(means: Floats, known: Bytes, varies: Floats, whole: Bytes) -> 
     x, y, z, level, square, one = means[0], means[1], means[2], means[3], means[4], means[5]
     for i in range(len(known)):
         size = np.sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
-        whole[i] = (known[i] > 0) & (one[i] > WHOLE) & (size > ZERO)
+        whole[i] = (known[i] > 0) & (one[i] > WHOLE) & (size > SMOOTH * level[i])
         length = ONE / max(size, TINY)
         x[i], y[i], z[i] = x[i] * length, y[i] * length, z[i] * length
     for i in range(len(known)):

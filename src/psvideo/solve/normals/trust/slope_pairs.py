@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles, Floats, Mask
@@ -28,6 +29,13 @@ AT_EDGE, BESIDE_EDGE, ACROSS_EDGE, JUMPS = 5, 11, 3, 6.0
 """Albedo jumps where it differs from one point to the next by more than so many times what it typically does beside:
 beyond the first number of points and up to the second, over lines of the third. There paint ends, or begins: a sheen
 changes as slowly beside. (With 4 times photographs showed a tenth less, with 8 a painted ball with noise more.)"""
+CREASE = np.float32(0.45)
+"""Neighbours whose normals differ by more lie on either side of a crease, and do not speak: faces of a box may be
+painted otherwise, and few faces tell paint from anything."""
+APART, JITTERS, JITTER_POINTS, LEAST_SLOPING = 2, np.float32(3.0), 41, 0.1
+"""Neighbours speak where their normals differ by more than so many times what three in a row differ from an even turn,
+in the mean over so many points: noise, and a codec's errors, turn a normal and make it longer at once, and say nothing
+of the slope. Of flat parts one pair in two hundred passes; less than the third of all is no slope to speak of."""
 LEAST_ALBEDO = np.float32(1e-6)
 TURNS, RIDGE = 5, 1e-4
 """Cauchy's weights are found in so many turns; numbers that hardly show stay near 0."""
@@ -69,12 +77,14 @@ def pairs_of(normals: Floats, lengths: Floats, paint: Floats, bright: Mask) -> S
     what only paint makes it (``by_colour.py``)."""
     cols = bright.shape[1]
     over, beside = (np.flatnonzero(both) for both in _both(bright))
+    ways, jitter = normals.reshape(3, -1), line(_jitter(normals, bright))
+    every = len(over) + len(beside)
+    over, beside = (_sloping(ways, jitter, at, step) for at, step in ((over, AVERAGED * cols), (beside, AVERAGED)))
     first, second = np.concatenate([over, beside]), np.concatenate([over + AVERAGED * cols, beside + AVERAGED])
-    if len(first) < LEAST_PAIRS:
+    if len(first) < max(LEAST_PAIRS, LEAST_SLOPING * every):
         return None
     chosen = np.linspace(0, len(first) - 1, min(MOST_PAIRS, len(first))).astype(np.intp)
     first, second, down = first[chosen], second[chosen], chosen < len(over)
-    ways = normals.reshape(3, -1)
     here, there = (ways[:, at].T.astype(np.float64) for at in (first, second))
     column, row = lengths.reshape(2, -1)[:, second].astype(np.float64) - lengths.reshape(2, -1)[:, first]
     size = np.sqrt(np.count_nonzero(bright))
@@ -82,6 +92,27 @@ def pairs_of(normals: Floats, lengths: Floats, paint: Floats, bright: Mask) -> S
     painted = paint.reshape(-1).astype(np.float64)
     painted = painted[second] - painted[first]
     return SlopePairs(np.where(down, column, row), here=here, there=there, place=place, other=other, paint=painted)
+
+
+def _sloping(ways: Floats, jitter: Floats, first: NDArray[np.intp], step: int) -> NDArray[np.intp]:
+    """Return those of the places ``first`` from which to others, a ``step`` on, normals turn more than they jitter
+    there, and no crease lies between."""
+    turned = np.sqrt(((ways[:, first + step] - ways[:, first]) ** 2).sum(axis=0))
+    return np.asarray(first[(turned < CREASE) & (turned > JITTERS * jitter[first])])
+
+
+def _jitter(normals: Floats, bright: Mask) -> Floats:
+    """Return by how much normals of three squares in a row differ from an even turn, (row, col), a mean around."""
+    second, counts = np.zeros(bright.shape, np.float32), np.zeros(bright.shape, np.float32)
+    for axis in (0, 1):
+        lines, three = np.moveaxis(normals, axis + 1, 1), np.moveaxis(bright, axis, 0)
+        ends = lines[:, : -2 * APART] + lines[:, 2 * APART :] - 2 * lines[:, APART:-APART]
+        there = three[: -2 * APART] & three[APART:-APART] & three[2 * APART :]
+        into = (np.moveaxis(plane, axis, 0)[APART:-APART] for plane in (second, counts))
+        for plane, values in zip(into, (np.sqrt((ends**2).sum(axis=0)), np.float32(1)), strict=True):
+            plane += there * values
+    around = (JITTER_POINTS,) * 2
+    return np.asarray(cv2.blur(second, around) / np.maximum(cv2.blur(counts, around), np.float32(1e-6)), np.float32)
 
 
 def without_edges(albedo: Floats, known: Mask) -> Floats:
