@@ -35,7 +35,7 @@ painted otherwise, and few faces tell paint from anything."""
 APART, JITTERS, JITTER_POINTS, LEAST_SLOPING = 2, np.float32(3.0), 41, 0.1
 """Neighbours speak where their normals differ by more than so many times what three in a row differ from an even turn,
 in the mean over so many points: noise, and a codec's errors, turn a normal and make it longer at once, and say nothing
-of the slope. Of flat parts one pair in two hundred passes; less than the third of all is no slope to speak of."""
+of the slope. The three lie so many points apart. Where fewer of all neighbours speak than the last share, none do."""
 LEAST_ALBEDO = np.float32(1e-6)
 TURNS, RIDGE = 5, 1e-4
 """Cauchy's weights are found in so many turns; numbers that hardly show stay near 0."""
