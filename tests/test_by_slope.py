@@ -15,6 +15,7 @@ from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.added_light import added_unseen
 from psvideo.solve.normals.trust.by_slope_kernel import SUMMED, fill_averaged, fill_in_light, fill_summed
 from psvideo.solve.normals.trust.judging import looked_at
+from psvideo.solve.normals.trust.slope_pairs import pairs_of
 
 Shade = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """What cosines to the light and to half way send back of an albedo of 1, (row, col)."""
@@ -324,6 +325,17 @@ def test_flat_faces_have_no_slope_for_paint_to_go_with_and_what_noise_makes_of_t
     surface = Solving(error=True).solve(plates, lit)
     assert angles_deg(surface.normals, normals).mean() < 2
     assert surface.valid.mean() > 0.8
+
+
+def test_neighbours_on_either_side_of_a_crease_do_not_speak() -> None:
+    _, col = np.mgrid[:60, :160].astype(np.float32)
+    lean = np.where(col < 80, -0.7, 0.3) + 0.006 * (col % 80)
+    roof = np.stack([np.sin(lean), 0 * lean, np.cos(lean)]).astype(np.float32)
+    paint = np.zeros(col.shape, np.float32)
+    pairs = pairs_of(roof, np.zeros((2, *col.shape), np.float32), paint, np.ones(col.shape, np.bool_))
+    assert pairs is not None
+    turned = np.linalg.norm(pairs.there - pairs.here, axis=1)
+    np.testing.assert_allclose(turned, 0.03, atol=0.001)
 
 
 def test_too_few_points_in_the_light_of_all_lamps_say_nothing() -> None:
