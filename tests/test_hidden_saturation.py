@@ -81,6 +81,26 @@ def test_light_that_is_not_clipped_ends_at_no_level(tmp_path: Path) -> None:
     assert saturation_of(ps.open_take(clip)) is None
 
 
+def test_a_white_level_of_other_files_is_named_and_nobody_is_told_to_open_the_aperture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip = filmed(tmp_path, intensity=0.9)
+    plan = clip / "plan.toml"
+    told = plan.read_text(encoding="utf-8").replace('"slog3"', '"linear"')
+    plan.write_text(told.replace("[camera]", f"[camera]\nwhite_level = {WHITE}", 1), encoding="utf-8")
+    for frame in clip.rglob("*.png"):
+        codes = cv2.imread(str(frame), cv2.IMREAD_UNCHANGED)
+        assert codes is not None
+        cv2.imwrite(str(frame), (codes // 256).astype(np.uint8))
+    assert main(["check", str(clip)]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "bad exposure How bright the picture is cannot be said" in said
+    assert "these 8-bit files is 255: it was meant for other files" in said
+    assert "Write the code at which these saturate" in said
+    assert "aperture" not in said
+    assert "flash longer" not in said
+
+
 def test_codes_that_lie_low_in_their_files_are_not_called_dark(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -195,6 +195,16 @@ def test_names_after_a_first_search_that_failed_are_a_guess_and_said_to_be(
     assert ("was found in later ones" if first_light else "the picture shows no marker") in said
 
 
+def test_a_light_that_never_fires_is_what_hides_a_marker_and_no_other_plan_is_asked_for(make_plan: PlanMaker) -> None:
+    plan = make_plan(lights=("key", "left", "right", "top"), width_px=8, height_px=96)
+    plates = {slot: plate * (slot != plan.lit_slots[1]) for slot, plate in plates_of(plan).items()}
+    chain = taken(Chain(plan=plan), list(shoot(plan, frames=110, plates=plates).frames))
+    assert order_of(chain.followed) == "guess"
+    said = guess_words(chain.followed, first_light=None)
+    assert "see that every light fires" in said
+    assert "Flash a plan" not in said
+
+
 def test_names_that_a_marker_shows_are_no_guess_however_often_the_strobe_is_found(make_plan: PlanMaker) -> None:
     plan = make_plan(width_px=8, height_px=96)
     again = shoot(plan, frames=110, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))

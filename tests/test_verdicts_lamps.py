@@ -22,6 +22,7 @@ from judged_footage import (
     validity,
 )
 
+from psvideo.cli.commands.sync import describe_timing
 from psvideo.model.camera import Encoding
 from psvideo.model.swing import Swing
 from psvideo.model.timing import Flash
@@ -259,6 +260,9 @@ def test_a_dark_slot_is_not_asked_for_where_the_plan_has_one() -> None:
         assert (order.grade, order.subject) == ("doubtful", "order")
         assert word in order.advice
         assert ("Shoot" in order.advice) is (len(flashes) == 1)
+        said = describe_timing(timing_of(order="guess", flashes=flashes))
+        assert ("shows no marker" in said) is (len(flashes) == 1)
+        assert ("every light fires" in said) is (len(flashes) == 2)
 
 
 @pytest.mark.parametrize(("by", "word"), [(0.25, "grows by 2"), (-0.2, "fades by 1"), (0.03, "")])

@@ -85,15 +85,24 @@ DEPTHS = (8, 10, 12, 14)
 """Bits that cameras record, and that files of 16 bits may hold as they are, at their lower end."""
 
 
-def level_warning(header: Header, encoding: Encoding) -> tuple[str, ...]:
-    """Say where the plan's white level was meant for other files: all light would count as so much darker."""
+def white_of_others(header: Header, encoding: Encoding) -> str:
+    """Say where a plan's white level was meant for other files, for no code of these reaches it; "" where it was not.
+    All light counts as so much darker."""
     if header.bits is None or encoding.white_level is None or encoding.white_level < 2**header.bits:
-        return ()
+        return ""
     return (
         f"white_level is {encoding.white_level:g} in the plan, and the largest code of these {header.bits}-bit files "
-        f"is {2**header.bits - 1}: it was meant for other files. Write the code at which these saturate, or leave it "
-        "out",
+        f"is {2**header.bits - 1}: it was meant for other files"
     )
+
+
+RIGHT_WHITE = "Write the code at which these saturate, or leave it out"
+
+
+def level_warning(header: Header, encoding: Encoding) -> tuple[str, ...]:
+    """Say where the plan's white level was meant for other files, and what to do."""
+    found = white_of_others(header, encoding)
+    return (f"{found}. {RIGHT_WHITE}",) if found else ()
 
 
 def depth_held(bits: int, encoding: Encoding) -> int:

@@ -5,13 +5,17 @@ skip their dark slots mark the cycle. Where turning the cycle by some flashes gi
 lights' names are not in the timing: their powers, a rig's directions or a person must say it.
 """
 
-from collections.abc import Sequence, Set
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 
-from psvideo.model.plan import Plan
+from psvideo.model.plan import HasLights, Plan
 
 NOT_FIRING = 0.01
 """Of the strongest light's, what a light that fires gives at least: with less it looks like a dark slot."""
+HIDDEN_MARKER = (
+    "The plan has a dark slot, and the picture does not show which one it is: see that every light fires, for one that "
+    "gives no light looks as dark."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +55,11 @@ def turns_in_the_dark(plan: Plan, dead: Set[int]) -> tuple[int, ...]:
 def has_marker(plan: Plan) -> bool:
     """Return whether every turn of the cycle looks unlike it, so that timing alone distinguishes the flashes."""
     return len(alike_turns(plan)) == 1
+
+
+def why_guessed(flashes: Iterable[HasLights]) -> str:
+    """Say why timing did not show which light is which, of flashes of a plan or of a clip that have such a guess."""
+    return HIDDEN_MARKER if any(flash.is_dark for flash in flashes) else "The picture shows no marker."
 
 
 def turned_slot(plan: Plan, slot: int, turn: int) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from psvideo.errors import PsvideoError
-from psvideo.model.marker import cycle_places, first_break
+from psvideo.model.marker import cycle_places, first_break, why_guessed
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
@@ -40,8 +40,8 @@ def refuse_unnumbered(plan: Plan, timing: Timing, numbers: Sequence[int] | None 
     """
     if timing.order == "guess":
         raise PsvideoError(
-            f"{timing.clip}: which flash is which is a guess, as the plan has no marker, so nothing says which flashes "
-            "two cameras share. Plan with a coded marker (`marker` coded)."
+            f"{timing.clip}: which flash is which is a guess, so nothing says which flashes two cameras share. "
+            f"{why_guessed(timing.flashes)} Plan with a coded marker (`marker` coded)."
         )
     slots = [flash.slot for flash in timing.flashes]
     last = first_break(plan, slots)

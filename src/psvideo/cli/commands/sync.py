@@ -126,7 +126,7 @@ def describe_timing(timing: "Timing") -> str:
     lines = [f"{len(timing.flashes)} flashes, {complete} of them complete."]
     if timing.how_sure:
         lines.append(f"The strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm. {timing.how_sure}")
-    lines.append(ORDER_SENTENCE[timing.order])
+    lines.append(_order_words(timing))
     lines += [timing.order_note] if timing.order_note else []
     lines += [f"{counted(hole.count, 'frame')} missing after number {hole.after}." for hole in timing.dropped_frames]
     lines += [f"Frame {number} repeats the one before it." for number in timing.repeated_frames]
@@ -137,6 +137,15 @@ ORDER_SENTENCE = {
     "marker": "Which light is which is known from the cycle's marker.",
     "rig": "Which light is which was found from the rig's directions.",
     "given": "Which light is which was given.",
-    "guess": "Which light is which is a GUESS: the picture shows no marker. Name the light of the clip's first "
-    "complete flash with --first-light NAME.",
 }
+
+
+def _order_words(timing: "Timing") -> str:
+    from psvideo.model.marker import why_guessed
+
+    if timing.order != "guess":
+        return ORDER_SENTENCE[timing.order]
+    return (
+        f"Which light is which is a GUESS. {why_guessed(timing.flashes)} Where you know the light of the clip's first "
+        "complete flash, name it with --first-light NAME."
+    )

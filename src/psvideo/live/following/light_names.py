@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 from psvideo.live.following.follow import Follower
+from psvideo.model.marker import HIDDEN_MARKER, has_marker
 from psvideo.model.timing import Order
 
-ADVICE = "Flash a plan whose cycle has a marker, such as a dark slot: names are sure then, after every pause."
+MARK_IT = "Flash a plan whose cycle has a marker, such as a dark slot: names are sure then, after every pause."
 
 
 def order_of(followed: Sequence[Follower]) -> Order:
@@ -19,13 +20,14 @@ def guess_words(followed: Sequence[Follower], *, first_light: str | None) -> str
     guessed = next((one for one in followed if one.lock.order == "guess"), None)
     if guessed is None:
         return ""
+    advice = HIDDEN_MARKER if has_marker(guessed.plan) else MARK_IT
     if guessed is not followed[0]:
         found = f"The strobe was lost, and found again at {guessed.lock.at_s:.1f} s: which light is which is a guess"
         known = ", as `first_light` speaks of the first frames alone" if first_light else ""
-        return f"{found} from there on{known}. {ADVICE}"
+        return f"{found} from there on{known}. {advice}"
     if first_light:
         return (
             "Which light is which is a guess: `first_light` speaks of the first frames, and the strobe was found in "
-            f"later ones. Begin with the lights flashing. {ADVICE}"
+            f"later ones. Begin with the lights flashing. {advice}"
         )
-    return f"Which light is which is a guess: the picture shows no marker, and `first_light` was not given. {ADVICE}"
+    return f"Which light is which is a guess: the picture shows no marker, and `first_light` was not given. {advice}"

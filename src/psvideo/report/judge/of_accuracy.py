@@ -113,9 +113,10 @@ def distance(observed: Observed) -> Iterator[Judgement]:
         yield Judgement(
             subject="distance",
             grade="doubtful",
-            found=f"The lights are near, and in {100 * share:.0f} % of the subject their light does not say how far "
-            "away it is (in shadow beside what stands before it, where few lights reach, or where it is dim): the "
-            "distance is a guess there, and normals may be turned too far to be trusted.",
+            found=f"The lights are near, and in {100 * share:.0f} % of the subject's pixels too little is known of how "
+            "far away they are (in shadow beside what stands before them, where few lights reach, or where it is dim): "
+            "normals there may be turned too far to be trusted. This counts pixels, one by one: where a whole surface "
+            "stands, as depth says it, is found from all of its pixels together.",
             advice="Give a depth that is known (`depth`), place the lights farther away, or use more of them.",
         )
 

@@ -1,11 +1,12 @@
-"""Judgements on codes that the plan misreads: a sensor that saturates below the largest code, light below black."""
+"""Judgements on codes that the plan misreads: a sensor that saturates below the largest code, or above it by a white
+level of other files, and light below black."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip.linear import DEPTHS
+from psvideo.clip.linear import DEPTHS, RIGHT_WHITE, white_of_others
 from psvideo.clip.record import Clip
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.report.judgement import Judgement
@@ -29,6 +30,20 @@ def hidden_saturation(thin: Sequence[NDArray[np.float32]], clip: Clip) -> Judgem
         f"sensor seems to saturate (up to {100 * level.share:.0f} % of a frame). plan.toml does "
         "not say so, and what is clipped counts as measured.",
         advice=f"Write white_level = {code} into the plan's [camera] table, and look again.",
+    )
+
+
+def unreachable_white(clip: Clip) -> Judgement | None:
+    """Judge whether the plan's white level was meant for other files, so that light counts as darker than it is; None
+    where not."""
+    found = white_of_others(clip.header, clip.plan.camera.encoding)
+    if not found:
+        return None
+    return Judgement(
+        subject="exposure",
+        grade="bad",
+        found=f"How bright the picture is cannot be said: {found}.",
+        advice=f"{RIGHT_WHITE}, and look again.",
     )
 
 

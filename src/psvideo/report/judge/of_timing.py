@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from psvideo.model.half_flash import HalfFlash
+from psvideo.model.marker import HIDDEN_MARKER
 from psvideo.model.timing import Timing
 from psvideo.report.judgement import Judgement
 
@@ -15,10 +16,7 @@ CHECK_PLAN = (
 )
 GAIN_FIRST = "Fix the camera's exposure and gain first (see the line on gain): that frames change costs most of this."
 MARK_IT = "Shoot with a dark slot as marker, or name the first light with `first_light`."
-DARK_HIDDEN = (
-    "The plan has a dark slot, and the picture does not show which one it is: see that every light fires, for one that "
-    "gives no light looks as dark. Or name the first light with `first_light`."
-)
+DARK_HIDDEN = f"{HIDDEN_MARKER} Or name the first light with `first_light`."
 
 
 def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:

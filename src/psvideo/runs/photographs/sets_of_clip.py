@@ -9,7 +9,9 @@ from psvideo.clip import Take
 from psvideo.clip.transfer import find_curve
 from psvideo.compute.progress import Watch
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.marker import why_guessed
 from psvideo.model.plan import Plan, reference_duration_s
+from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
 from psvideo.runs.photographs.opened_sets import LightSets, Reading
@@ -23,7 +25,7 @@ def sets_of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
     whole = gather(take, timing, aligning=UNMOVED, watch=watch)
     shown = partial(pictures_of_round, flashes_s=_flashes_s(plan))
     sets = map(shown, islice(whole, None if reading.frames else reading.most))
-    guessed = (_guess(take, timing.order_note),) if timing.order == "guess" else ()
+    guessed = (_guess(take, timing),) if timing.order == "guess" else ()
     return LightSets(
         name=take.clip.name,
         names=plan.lights,
@@ -49,10 +51,10 @@ def _flashes_s(plan: Plan) -> tuple[float, ...] | None:
     return None if plan.mode == "synced" else tuple(reference_duration_s(plan, light) for light in plan.lights)
 
 
-def _guess(take: Take, note: str) -> str:
+def _guess(take: Take, timing: Timing) -> str:
     return (
-        f"{take.clip.path}: the plan has no marker, so which light is which is a guess ({note or 'nothing shows it'}). "
-        "Name the light of the first complete flash with `first_light`."
+        f"{take.clip.path}: which light is which is a guess. {timing.order_note or why_guessed(timing.flashes)} Where you know the "
+        "light of the first complete flash, name it with `first_light`."
     )
 
 
