@@ -219,7 +219,7 @@ def test_cameras_of_different_strobes_are_refused(make_plan: PlanMaker) -> None:
     misnamed = camera_clocks([first, seen(plan, replace(TRUE, rate_ppm=1020.0), begin=0, count=200)])
     assert "misnamed" in misnamed.notes[0]
     guessed = CameraTake(plan=plan, timing=replace(first.timing, order="guess"))
-    with pytest.raises(PsvideoError, match="is a guess.* see that every light fires"):
+    with pytest.raises(PsvideoError, match=r"is a guess.* see that every light fires"):
         camera_clocks([first, guessed])
 
 

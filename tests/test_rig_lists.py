@@ -1,5 +1,6 @@
 """Light lists of other programs: what is written is read back to the last digit, and what they cannot hold is said."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -214,6 +215,53 @@ def test_commas_in_comments_are_no_decimal_commas(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("# lamps 3.5 m away\n0 0 1\n0,6 0 0,8\n0 0.6 0.8\n")
     with pytest.raises(PsvideoError, match="writes '0,6'"):
         read_rig(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize(
+    ("text", "typed"),
+    [
+        ("0,1,0,2,0,97\n-0,3,0,2,0,93\n", "Where commas were decimal points, write 0.1 0.2 0.97."),
+        ('name,x,y,z\n"a","0,1","0,2","0,97"\n', "writes '0,1'. Expected numbers with points, such as 0.1."),
+        ("(0.1 0.2 0.97)\n(-0.3 0.2 0.93)\n", "has brackets ((0.1 0.2 0.97))."),
+        ("[0.1,0.2,0.97]\n[-0.3,0.2,0.93]\n", "has brackets ([0.1,0.2,0.97])."),
+        ('{"lights": [[0, 0, 1]]}', "is JSON."),
+    ],
+    ids=["commas for points and spaces", "quoted commas", "round brackets", "square brackets", "JSON"],
+)
+def test_commas_and_brackets_where_spaces_belong_are_answered_with_what_to_type(
+    tmp_path: Path, text: str, typed: str
+) -> None:
+    (tmp_path / "a.txt").write_text(text)
+    with pytest.raises(PsvideoError, match=re.escape(typed)):
+        read_rig(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize(
+    ("line", "typed"),
+    [
+        ("direction = [0.1 0.2 0.97]", "Write commas between the numbers of a list: [0.1, 0.2, 0.97]."),
+        ('direction = "0.1 0.2 0.97"', "expected a list, such as [0.1, 0.2, 0.97]."),
+        ("direction = [0,1, 0,2, 0,97]", "expected at most 3 values, such as [0.1, 0.2, 0.97]."),
+        ("direction = [0, 0, 1]\nintensity = 0,5", "Write numbers with a point: 0.5."),
+        ("direction = [0, 0, 1", "Mend that line"),
+    ],
+)
+def test_spaces_and_commas_in_a_rig_where_the_other_belongs_are_answered_with_what_to_type(
+    tmp_path: Path, line: str, typed: str
+) -> None:
+    (tmp_path / "rig.toml").write_text(f'schema = "psvideo-rig/1"\n[[light]]\nname = "a"\n{line}\n')
+    with pytest.raises(PsvideoError, match=re.escape(typed)):
+        read_rig(tmp_path / "rig.toml")
+
+
+@pytest.mark.parametrize("apart", [",", " ", "; "])
+def test_names_given_as_one_are_answered_with_one_option_for_each(
+    tmp_path: Path, apart: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "two.lp").write_text("2\n0 0 1\n0.6 0 0.8\n")
+    words = ["calibrate", "convert", str(tmp_path / "two.lp"), "-o", str(tmp_path / "rig.toml")]
+    assert main([*words, "--name", f"key{apart}left"]) == 2
+    assert "in the list's order: --name key --name left." in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_near_light_is_in_no_list_and_a_name_that_shows_no_kind_is_refused(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract_mistakes import mistakes_in_words
 from psvideo.formats.paths import check_file
+from psvideo.formats.separators import toml_separators
 
 
 class Contract(BaseModel):
@@ -107,7 +108,8 @@ def parse_toml(text: str, model: type[Model], schema: str, *, source: str) -> Mo
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as fault:  # TOMLDecodeError; numbers or tables without end
-        raise PsvideoError(f"{source}: not a TOML file: {fault}. Mend that line (TOML 1.0).") from fault
+        advice = toml_separators(text) or "Mend that line (TOML 1.0)."
+        raise PsvideoError(f"{source}: not a TOML file: {fault}. {advice}") from fault
     return parse_record(data, model, schema, source=source)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from psvideo.errors import nearest
+from psvideo.formats.separators import as_list
 
 MOST_SAID, LOOKED_AT = 12, 200
 """So many mistakes are said, of so many that a validation finds first: a file that a program wrote wrong has as many as
@@ -57,7 +58,8 @@ def _mistake(model: type[BaseModel], error: Any) -> str:
     if error["type"] in ("too_short", "too_long"):
         allowed = error["ctx"].get("min_length", error["ctx"].get("max_length"))
         least = "at least" if error["type"] == "too_short" else "at most"
-        return f"key '{key}' is {error['input']!r}: expected {least} {allowed} values"
+        typed = as_list(error["input"], most=allowed)
+        return f"key '{key}' is {error['input']!r}: expected {least} {allowed} values{typed}"
     name = ".".join(part for part in place if isinstance(part, str))
     if error["type"] in ("model_type", "dict_type"):
         table = f"[[{name}]]" if isinstance(place[-1], int) else f"[{name}]"
@@ -67,6 +69,7 @@ def _mistake(model: type[BaseModel], error: Any) -> str:
     message = error["msg"].removeprefix("Value error, ")
     if message.startswith("Input should be "):
         message = f"expected {_expected(message)}"
+        message += as_list(error["input"]) if error["type"] in ("list_type", "tuple_type") else ""
     message = message[:1].lower() + message[1:]
     if isinstance(error["input"], dict | list) and error["type"] == "value_error":
         return f"{message}" if not key else f"'{key}': {message}"

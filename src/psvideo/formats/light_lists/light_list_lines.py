@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.separators import pairs_with_points
 from psvideo.model.units import counted
 
 DIRECTION, WITH_ONE, WITH_STRENGTHS = 3, 4, 6
@@ -77,10 +78,12 @@ def directed(path: Path, lines: Sequence[ListLine], *, by_count: bool = False) -
     if len(right) != 1:
         odd = next((line for line in lines if len(line.words) not in (DIRECTION, WITH_STRENGTHS)), None)
         words = (odd or max(lines, key=lambda line: len(line.words))).words
+        pointed = pairs_with_points(words)
+        typed = f" Where commas were decimal points, write {' '.join(pointed)}." if len(pointed) >= DIRECTION else ""
         raise PsvideoError(
             f"{path}: a line has {counted(len(words), 'number')} ({' '.join(words[:8])}). Expected three in every "
             "line, x y z of the direction to the light, or these, of length 1, and the light's strength behind them: "
-            "one number, or red, green and blue."
+            f"one number, or red, green and blue.{typed}"
         )
     return _without_places(right[0])
 

@@ -25,6 +25,8 @@ DIRECTIONS, INTENSITIES, FILENAMES = "light_directions.txt", "light_intensities.
 ANGLES_SPAN = 7.0
 """Columns that span more, beside a third one that is the same throughout, are degrees: more than radians do."""
 AXES = "x right, y up, z towards the camera"
+BRACKETED = re.compile(r"\s*[(\[][^()\[\]]*[)\]][,;]?\s*")
+"""A line that is a vector in brackets, as programs write it."""
 DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 
 
@@ -81,18 +83,21 @@ def _lights(path: Path) -> list[ListLine]:
 
 def _lines(path: Path, text: str) -> list[ListLine]:
     """Return the lines that hold numbers. Raises PsvideoError where none does, or where they have decimal commas."""
-    words = re.split(r"[\s;]+", "\n".join(without_comments(text)))
+    bare = without_comments(text)
+    words = re.split(r"[\s;\"']+", "\n".join(bare))
     comma = next((word for word in words if DECIMAL_COMMA.fullmatch(word)), None)
     if comma:
         raise PsvideoError(
             f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
         )
     json = text.lstrip()[:1] in ("{", "[")
-    lines = [] if json else lines_in(text)
+    bracketed = next((line.strip() for line in bare if BRACKETED.fullmatch(line)), None)
+    lines = [] if json or bracketed else lines_in(text)
     if not lines:
+        found = f"has brackets ({bracketed[:60]})" if bracketed else "is JSON" if json else "holds no numbers"
         raise PsvideoError(
-            f"{path}: {'is JSON' if json else 'holds no numbers'}. Expected rig.toml, an .lp file, or one light "
-            "direction x y z per line."
+            f"{path}: {found}. Expected rig.toml, an .lp file, or one light direction x y z per line, its numbers with "
+            "points and spaces or commas between them, such as 0.1 0.2 0.97."
         )
     return lines
 

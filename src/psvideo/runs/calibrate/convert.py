@@ -1,5 +1,6 @@
 """The whole of ``psvideo calibrate convert``: a rig in, the file of lights that another program reads out."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -66,5 +67,11 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
     if len(listed) != len(names):
         raise UsageError(
             f"`name`: {path} lists {counted(len(listed), 'light')}, and is given {counted(len(names), 'name')} "
-            f"({', '.join(names)}). Give one for each light, in the list's order."
+            f"({', '.join(names)}). Give one for each light, in the list's order{_typed(names)}."
         )
+
+
+def _typed(names: Sequence[str]) -> str:
+    """Return what to type for names that were given as one, with commas or spaces between them; "" elsewhere."""
+    apart = re.split(r"[\s,;]+", " ".join(names).strip())
+    return ": " + " ".join(f"`name` {one}" for one in apart) if len(apart) > len(names) else ""

@@ -52,9 +52,10 @@ def _flashes_s(plan: Plan) -> tuple[float, ...] | None:
 
 
 def _guess(take: Take, timing: Timing) -> str:
+    why = timing.order_note or why_guessed(timing.flashes)
     return (
-        f"{take.clip.path}: which light is which is a guess. {timing.order_note or why_guessed(timing.flashes)} Where you know the "
-        "light of the first complete flash, name it with `first_light`."
+        f"{take.clip.path}: which light is which is a guess. {why} Where you know the light of the first complete "
+        "flash, name it with `first_light`."
     )
 
 

@@ -12,7 +12,7 @@ from psvideo.report.observe.hidden_level import may_hide, may_lie_below, numbers
 
 def saturation_of(take: Take) -> Judgement | None:
     """Judge whether a take's sensor saturates at a level that its plan does not name, its plan's white is none of its
-    codes, or all of its light lies below black; None where nothing of it shows. One frame in light is held at a time."""
+    codes, or all of its light lies below black; None where none of it shows. One frame in light is held at a time."""
     clip, tops, thin = take.clip, list[float](), list[NDArray[np.float32]]()
     if unreachable := unreachable_white(clip):
         return unreachable

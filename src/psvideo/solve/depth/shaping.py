@@ -150,9 +150,9 @@ def scale_note(shaping: Shaping) -> str:
         parts = sorted(placed, key=lambda part: -part.share)[:MOST_NAMED]
         named = "; ".join(f"{part.words}, {_percent(part.share)} of the picture" for part in parts)
         return (
-            "Depth is in metres. How far away each surface is as a whole was found by how the near lights fall off over "
-            "all of it, as well as these are known to the rig; single pixels may be farther off. In the first result: "
-            f"{named}."
+            "Depth is in metres. How far away each surface is as a whole was found by how the near lights fall off "
+            "over all of it, as well as these are known to the rig; single pixels may be farther off. In the first "
+            f"result: {named}."
         )
     if shaping.metric and shaping.known_m is not None:
         return "Depth is in metres: its scale is that of the depth given."
@@ -189,8 +189,8 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
         if doubtful >= 0.01:
             said.append(
                 f"How far away the surfaces are that fill {_percent(doubtful)} of the picture, the falloff of the near "
-                f"lights hardly tells: their depth may be off by more than {100 * DOUBTFUL:.0f} % as a whole. A known depth (`depth`), more lights or a "
-                "rig that is measured better would say."
+                f"lights hardly tells: their depth may be off by more than {100 * DOUBTFUL:.0f} % as a whole. A known "
+                "depth (`depth`), more lights or a rig that is measured better would say."
             )
     elif first is not None and first.parts > 1:
         said.append(
