@@ -405,6 +405,46 @@ def test_a_wall_whose_normals_differ_by_noise_alone_says_nothing_of_the_rig() ->
     assert slope_agreement(coarse_normals(gentle(1.5, curved=0.0))) is None
 
 
+def sheet(*, lean_x: float, lean_y: float, raised: bool, curved: float = 0.0) -> Surface:
+    """Return a wall, and before it a square of paper that leans by two slopes, or a roof over all of it with creases
+    that belong to one surface (not ``raised``), or a sheet that is curved, with the noise of good footage."""
+    rng = np.random.default_rng(5)
+    row, col = np.mgrid[:120, :160].astype(np.float32)
+    x, y = (col - 79.5) / 80, (59.5 - row) / 80
+    inside = (np.abs(x + 0.2 * y) < 0.5) & (np.abs(y - 0.2 * x) < 0.5)
+    p, q = np.where(inside, lean_x, 0.0), np.where(inside, lean_y, 0.0)
+    if not raised:
+        folded = np.sign(x + 0.5 * y)  # a ridge along (0.5, -1): slopes step across it, and along nothing else
+        p, q = lean_x * folded, 0.5 * lean_x * folded
+    p, q = p - curved * x * (1 + y**2), q + curved * y * (1 + x**2)
+    normals = np.stack([-p, -q, np.ones_like(p)], axis=-1) + 0.004 * rng.normal(size=(120, 160, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    everywhere = np.ones((120, 160), np.bool_)
+    return Surface(normals=normals.astype(np.float32), albedo=np.full((120, 160), 0.5, np.float32), valid=everywhere)
+
+
+def test_a_sheet_of_paper_before_a_wall_says_nothing_of_the_rig_for_its_edges_end_it() -> None:
+    for lean_x, lean_y in ((0.4, 0.3), (0.4, -0.3), (0.2, 0.5), (-0.3, 0.1)):
+        agreement = slope_agreement(coarse_normals(sheet(lean_x=lean_x, lean_y=lean_y, raised=True)))
+        assert agreement is None or agreement > 0.3
+
+
+def test_a_crease_of_one_surface_and_what_is_curved_beside_a_sheet_of_paper_speak() -> None:
+    crease = slope_agreement(coarse_normals(sheet(lean_x=0.4, lean_y=0.0, raised=False)))
+    assert crease is not None
+    assert crease > 0.9
+    mirrored = sheet(lean_x=0.4, lean_y=0.0, raised=False)
+    mirrored.normals[..., 0] *= -1
+    told = slope_agreement(coarse_normals(mirrored))
+    assert told is not None
+    assert told < -0.9
+    warped = sheet(lean_x=0.4, lean_y=0.3, raised=True, curved=0.5)
+    warped.normals[..., 0] *= -1
+    wrong = slope_agreement(coarse_normals(warped))
+    assert wrong is not None
+    assert wrong < 0.3
+
+
 def leaning(lean_deg: float, *, mirrored: bool, rim_noise: float = 0.0) -> Surface:
     """Return a pipe that leans to the right by an angle, with noise that grows towards its rim."""
     lean, rng = np.radians(lean_deg), np.random.default_rng(5)

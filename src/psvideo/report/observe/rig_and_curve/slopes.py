@@ -2,6 +2,7 @@
 
 For heights z(x, y) with slopes p and q, dp/dy = dq/dx. Normals found with mirrored, turned or exchanged lights break
 this, even with three lights, which explain any brightness. Both sides are held against each other by correlation.
+Where faces are flat, slopes change on their edges alone, and only the edges inside one body are bound to this.
 """
 
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
+from psvideo.report.observe.rig_and_curve.edges_of_slopes import on_edges, smooth_slopes
 from psvideo.report.observe.thinned import thin_surface
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
@@ -49,6 +51,13 @@ LEAST_TRUSTED, TRUSTED_AGREE = 0.3, 0.6
 """Slopes of trusted normals count for themselves where they are this share of what three lights gave, and agree so
 well. (Under lights that are exchanged, mirrored, in another order or 15 degrees off: 0.32 at most; under right ones
 0.77 and more.)"""
+BESIDE_EDGES, BESIDE_NOISE = 0.02, 50.0
+"""Slopes turn on edges alone where all other places hold less than this share of it, and less than the second times
+what noise makes. (Boards, boxes and leaves under right rigs: 0.011 and 32 at most; bodies whose lights are exchanged:
+from 0.014 and 112 on, but for a small ball between boards.)"""
+EDGES_TELL = -0.3
+"""Some of these edges are creases, which belong to one surface, and others end one thing before another, which binds
+nothing: they agree by less than CLEAR under right rigs too (down to -0.13). Less than this is due to wrong lights."""
 WHOLE = 0.999
 LEAST_AVERAGED = 3
 """Of this many rows and columns, evenly, the mean of a larger square is taken."""
@@ -64,17 +73,29 @@ class Averaged(NamedTuple):
 def slope_agreement(small: Averaged) -> float | None:
     """Return the correlation of dp/dy with dq/dx: near 1 for a surface, 0 for noise, below it for wrong lights.
 
-    None where too few neighbouring normals are there, or where they show nothing but noise.
+    None where too few neighbouring normals are there, or where they show nothing but noise, or edges of flat faces.
     """
     valid, normals = small
-    found = _turning(valid, normals, BLUR_PX)
-    if found is None:
+    found = first = _turning(valid, normals, BLUR_PX)
+    if found is None or first is None:
         return None
-    if found.power <= TOO_MUCH * noise_of_slopes(valid, normals):
+    noise = noise_of_slopes(valid, normals)
+    if found.power <= TOO_MUCH * noise:
         found = _beyond_noise(valid, normals, found)
     if found is None or (found.crosswise < CROSSWISE and found.agreement < CLEAR):
         return None
+    if EDGES_TELL < found.agreement < CLEAR and _on_edges_alone(small, first, noise):
+        return None
     return found.agreement
+
+
+def _on_edges_alone(small: Averaged, all_of_it: "_Turning", noise: float) -> bool:
+    """Return whether slopes turn on edges, and hardly anywhere else; ``noise`` is the square that noise makes."""
+    beside = _turning(*small, BLUR_PX, left_out=on_edges(*small, BLUR_PX))
+    if beside is None:
+        return True
+    share = beside.power * beside.points / (all_of_it.power * all_of_it.points)
+    return share < BESIDE_EDGES and beside.power < BESIDE_NOISE * noise
 
 
 def surface_agreement(surface: Surface, small: Averaged, *, lights: int) -> float | None:
@@ -93,11 +114,13 @@ def surface_agreement(surface: Surface, small: Averaged, *, lights: int) -> floa
 
 
 class _Turning(NamedTuple):
-    """The correlation of dp/dy with dq/dx, their mean square (``power``), that as a share of the mean square of dp/dx
-    and dq/dy (``crosswise``), and how far noise alone may bring the correlation (``chance``)."""
+    """The correlation of dp/dy with dq/dx, their mean square (``power``) over so many ``points``, that as a share of
+    the mean square of dp/dx and dq/dy (``crosswise``), and how far noise alone may bring the correlation
+    (``chance``)."""
 
     agreement: float
     power: float
+    points: int
     crosswise: float
     chance: float
 
@@ -129,13 +152,20 @@ def noise_of_slopes(valid: NDArray[np.bool_], normals: NDArray[np.float32]) -> f
     return float((errors**2).sum() / (8 * np.pi * BLUR_PX**4))
 
 
-def _turning(valid: NDArray[np.bool_], normals: NDArray[np.float32], blur_px: float) -> _Turning | None:
-    """Return how slopes turn where normals are smoothed so far; None where too few are there."""
-    x, y, towards = cv2.split(cv2.GaussianBlur(normals * valid[..., None], (0, 0), blur_px))
-    depth = np.maximum(towards, np.float32(1e-6))
-    slope_x, slope_y = -x / depth, -y / depth
+def _turning(
+    valid: NDArray[np.bool_],
+    normals: NDArray[np.float32],
+    blur_px: float,
+    *,
+    left_out: NDArray[np.bool_] | None = None,
+) -> _Turning | None:
+    """Return how slopes turn where normals are smoothed so far, but where they are left out; None where too few are
+    there."""
+    slope_x, slope_y, towards = smooth_slopes(valid, normals, blur_px)
     gentle = valid & (slope_x * slope_x + slope_y * slope_y < np.float32(STEEPEST**2)) & (towards > 0)
     inside = cv2.erode(gentle.astype(np.uint8), np.ones((7, 7), np.uint8), borderValue=0) > 0
+    if left_out is not None:
+        inside &= ~left_out
     if inside.sum() < LEAST_PIXELS:
         return None
     inner = inside[1:-1], inside[:, 1:-1]  # nothing at the rim is inside
@@ -148,7 +178,7 @@ def _turning(valid: NDArray[np.bool_], normals: NDArray[np.float32], blur_px: fl
     apart = len(p_up) / (4 * np.pi * blur_px**2)  # so many of them know nothing of each other
     agreement = float(2 * (p_up * q_right).sum() / total)
     chance = BY_CHANCE / float(np.sqrt(max(apart, 1.0)))
-    return _Turning(agreement, total / len(p_up), total / max(own, 1e-12), chance)
+    return _Turning(agreement, total / len(p_up), len(p_up), total / max(own, 1e-12), chance)
 
 
 def share_away(surface: Surface, some: Surface | None = None) -> float:
