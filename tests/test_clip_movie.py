@@ -54,9 +54,9 @@ def test_frames_of_a_movie_that_are_kept_are_not_decoded_again(
     asked: list[int] = []
     read = movie_frames.read_movie
 
-    def watched(path: Path, stamps: Sequence[int]) -> Iterator[CodedPicture]:
+    def watched(path: Path, stamps: Sequence[int], numbers: Sequence[int]) -> Iterator[CodedPicture]:
         asked.extend(stamps)
-        return read(path, stamps)
+        return read(path, stamps, numbers)
 
     monkeypatch.setattr(movie_frames, "read_movie", watched)
     with keeping_near(tmp_path / "out") as kept:

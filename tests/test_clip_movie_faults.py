@@ -6,7 +6,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from written_movies import grey_ramp, make_frame, write_movie
+from written_movies import RATE, grey_ramp, make_frame, write_movie
 
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError
@@ -93,9 +93,54 @@ def test_damage_in_the_middle_of_a_movie_stops_there(tmp_path: Path, written_pla
     (tmp_path / "x.mp4").write_bytes(data)
     clip = open_clip(tmp_path / "x.mp4", plan=written_plan(rows=32, cols=48))
     seen: list[int] = []
-    with pytest.raises(PsvideoError, match=r"x\.mp4: .*(truncated|damaged)"):
+    with pytest.raises(PsvideoError, match=r"x\.mp4: .*truncated or damaged there\. Copy it again") as fault:
         seen.extend(frame.index for frame in read_frames(clip))
     assert len(seen) < 12
+    assert f"frame {len(seen)}, {len(seen) / float(RATE):.3f} s from the start, cannot" in str(fault.value)
+    assert f"which are whole (`frames` 0-{len(seen) - 1})." in str(fault.value)
+    with pytest.raises(PsvideoError, match=r"frame 6, .* choose other frames with `frames`\."):
+        list(read_frames(clip, [len(seen)]))
+
+
+@pytest.mark.parametrize("first", [0, 6])
+def test_damage_that_ffv1_s_checksums_show_is_not_painted_over(
+    tmp_path: Path, written_plan: Callable[..., Path], first: int
+) -> None:
+    """FFmpeg shows the picture before instead, and says nothing."""
+    noise = np.random.default_rng(0).integers(0, 255, (12, 32, 48)).astype(np.uint8)
+    frames = [make_frame([luma, luma[::2, ::2], luma[::2, ::2]], "yuv420p") for luma in noise]
+    write_movie(tmp_path / "x.mkv", frames, codec="ffv1", options={"level": "3", "slicecrc": "1", "slices": "4"})
+    plan = written_plan(rows=32, cols=48)
+    assert len(list(read_frames(open_clip(tmp_path / "x.mkv", plan=plan)))) == 12
+    with av.open(str(tmp_path / "x.mkv")) as movie:
+        place = next(one.pos or 0 for n, one in enumerate(movie.demux(video=0)) if n == 7)
+    data = bytearray((tmp_path / "x.mkv").read_bytes())
+    data[place + 700] ^= 0x10
+    (tmp_path / "x.mkv").write_bytes(data)
+    seen: list[int] = []
+    with pytest.raises(PsvideoError, match=r"x\.mkv: frame 7, .* s from the start, cannot be decoded"):
+        seen.extend(frame.index for frame in read_frames(open_clip(tmp_path / "x.mkv", plan=plan), range(first, 12)))
+    assert seen == list(range(first, 7))
+
+
+def test_what_is_left_of_a_truncated_movie_is_read_once_it_is_repacked(
+    tmp_path: Path, written_plan: Callable[..., Path]
+) -> None:
+    write_movie(tmp_path / "x.mkv", grey_ramp(24), codec="libx264", options={"g": "1"})
+    plan, data = written_plan(rows=32, cols=48), (tmp_path / "x.mkv").read_bytes()
+    (tmp_path / "x.mkv").write_bytes(data[: len(data) * 3 // 4])
+    with pytest.raises(
+        PsvideoError, match=r"the last of these, 0\.\d+ s from .*ffmpeg -i x\.mkv -c copy repacked"
+    ) as told:
+        open_clip(tmp_path / "x.mkv", plan=plan)
+    held = int(str(told.value).split(" holds ")[1].split()[0])
+    with av.open(str(tmp_path / "x.mkv")) as source, av.open(str(tmp_path / "repacked.mkv"), "w") as repacked:
+        copied = repacked.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = copied
+                repacked.mux(packet)
+    assert 0 < len(list(read_frames(open_clip(tmp_path / "repacked.mkv", plan=plan)))) == held < 24
 
 
 def test_a_pixel_format_that_is_not_read_is_named_with_its_file(

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,6 +17,7 @@ import av
 import numpy as np
 import pytest
 from live_clip import live_clip
+from written_movies import RATE, make_frame, write_movie
 
 import psvideo as ps
 from psvideo.cli.app import main
@@ -88,7 +90,26 @@ def test_a_sender_that_is_cut_off_in_the_middle_of_a_frame_loses_that_frame_alon
     words = ["live", "-", "--raw", "gray16le", "--plan", str(clip / "plan.toml"), "--no-page"]
     assert main([*words, "--record", str(tmp_path / "rec")]) == 0
     assert len(ps.open_take(tmp_path / "rec").numbers) == len(pictures) - 1
-    assert "1 frame came damaged or cut short, and was left out" in capsys.readouterr().err
+    said = " ".join(capsys.readouterr().err.split())
+    assert "1 frame came damaged or cut short, and was left out" in said
+    assert "96 x 72 pixels of gray16le make a frame" in said
+
+
+def test_frames_that_ffmpeg_paints_over_are_left_out_and_counted(clip: Path, tmp_path: Path) -> None:
+    plan, noise = ps.read_plan(clip / "plan.toml"), np.random.default_rng(0).integers(0, 255, (12, 72, 96))
+    frames = [make_frame([one, one[:, ::2], one[:, ::2]], "yuv422p") for one in noise.astype(np.uint8)]
+    write_movie(tmp_path / "x.mkv", frames, codec="mpeg2video", options={"g": "1", "qscale": "2", "b": "9000000"})
+    with av.open(str(tmp_path / "x.mkv")) as movie:
+        sizes = [(one.pos or 0, one.size) for one in movie.demux(video=0) if one.size]
+    data = bytearray((tmp_path / "x.mkv").read_bytes())
+    for n in (4, 7):
+        begin = sizes[n][0] + sizes[n][1] // 2
+        data[begin : begin + 300] = bytes(300)
+    (tmp_path / "x.mkv").write_bytes(data)
+    notes: list[str] = []
+    came = read_stream(str(tmp_path / "x.mkv"), replace(plan.camera, fps=RATE), noted=notes.append)
+    assert [frame.index for frame in came] == [0, 1, 2, 3, 5, 6, 8, 9, 10, 11]
+    assert any("2 frames came damaged or cut short, and were left out." in note for note in notes)
 
 
 def test_a_device_that_is_not_there_is_told_what_to_look_for(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -100,7 +100,8 @@ def _decoder(clip: Clip, numbers: list[int], in_files: bool) -> Callable[[int], 
         return lambda number: opened(clip.kind, clip.file_of(number), of_clip=in_files)
     from psvideo.clip.decode.movies.movie_frames import read_movie
 
-    pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])
+    stamps = [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers]
+    pictures = read_movie(clip.path, stamps, numbers)
     return lambda _: next(pictures)
 
 

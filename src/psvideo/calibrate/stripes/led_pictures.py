@@ -92,7 +92,7 @@ def _chosen(numbers: Sequence[int], frames: str | None) -> tuple[int, ...]:
 
 
 def _filmed(path: Path, stamps: dict[int, int], places: Sequence[int]) -> Iterator[tuple[int, CodedPicture]]:
-    return zip(places, read_movie(path, [stamps[place] for place in places]), strict=True)
+    return zip(places, read_movie(path, [stamps[place] for place in places], places), strict=True)
 
 
 def _refuse_others(paths: Sequence[Path], frames: str | None) -> None:

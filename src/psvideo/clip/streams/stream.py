@@ -161,7 +161,8 @@ def _decoded(
 def _whole_frames(
     container: "av.container.InputContainer", stream: "av.VideoStream", name: str, noted: Callable[[str], None]
 ) -> Iterator[av.VideoFrame]:
-    """Give the frames that can be decoded; a sender that is killed leaves half of one, networks lose parts."""
+    """Give the frames that can be decoded; a sender that is killed leaves half of one, networks lose parts. FFmpeg
+    paints over what is lost of a frame, and flags it."""
     damaged, in_a_row = 0, 0
     for packet in container.demux(stream):
         try:
@@ -172,9 +173,24 @@ def _whole_frames(
                 raise
             continue
         in_a_row = 0 if frames else in_a_row
-        yield from frames
+        damaged += sum(frame.is_corrupt for frame in frames)
+        yield from (frame for frame in frames if not frame.is_corrupt)
     if damaged:
-        noted(f"{name}: {counted(damaged, 'frame')} came damaged or cut short, and {_were(damaged)} left out.")
+        noted(
+            f"{name}: {counted(damaged, 'frame')} came damaged or cut short, and {_were(damaged)} left out."
+            f"{_cut_short(stream)}"
+        )
+
+
+def _cut_short(stream: "av.VideoStream") -> str:
+    """Say of bare bytes how many make a frame: where a sender's frames have fewer, every later one is shifted."""
+    if stream.codec_context.codec.name != "rawvideo" or stream.codec_context.pix_fmt is None:
+        return ""
+    size, pixels = f"{stream.width} x {stream.height}", stream.codec_context.pix_fmt
+    return (
+        f" By the plan and `raw`, {size} pixels of {pixels} make a frame; where the sender's frames are shorter or "
+        "longer, pictures roll and no strobe is found: check both."
+    )
 
 
 def _why(fault: Exception) -> str:

@@ -61,7 +61,9 @@ def index_movie(path: Path) -> Movie:
         promised = promised_frames(container, stream, found.period * found.per_frame)
         said = _Said.of(container, stream)
     hidden = len(stamps.timestamps) - len(shown)
-    _refuse_truncated(path, found, held=len(stamps.timestamps), hidden=hidden, promised=promised)
+    _refuse_truncated(
+        path, found, held=len(stamps.timestamps), hidden=hidden, promised=promised, tick_s=said.time_base_s
+    )
     timestamps = found.timestamps
     header = next(read_movie(path, timestamps[:1])).header
     warnings = _warnings(said, stamps, found, hidden=hidden, bits=header.bits or 0)
@@ -116,12 +118,15 @@ class _Said:
         )
 
 
-def _refuse_truncated(path: Path, found: Places, *, held: int, hidden: int, promised: int) -> None:
+def _refuse_truncated(path: Path, found: Places, *, held: int, hidden: int, promised: int, tick_s: float) -> None:
     if not held:
         raise PsvideoError(f"{path}: holds no frame that can be found; it is truncated or damaged. Copy it again.")
     if held < promised and found.places[-1] + 1 + found.left_out + hidden < promised:
+        last_s = (found.timestamps[-1] - found.timestamps[0]) * tick_s
         raise PsvideoError(
-            f"{path}: holds {held} frames, and its header promises {promised}: it is truncated. Copy it again."
+            f"{path}: holds {held} frames, and its header promises {promised}: it is truncated, or damaged behind the "
+            f"last of these, {last_s:.3f} s from the start. Copy it again. Where there is no better copy, repack what "
+            f"it holds: ffmpeg -i {path.name} -c copy repacked{path.suffix}"
         )
 
 

@@ -11,6 +11,7 @@ from av.container import InputContainer
 from av.stream import Disposition
 from av.video.stream import VideoStream
 
+from psvideo.clip.decode.movies.ffv1_slices import SliceChecks
 from psvideo.clip.decode.movies.movie_codes import rgb_codes
 from psvideo.clip.decode.movies.movie_ends import how_it_breaks_off
 from psvideo.clip.decoded import CodedPicture
@@ -21,30 +22,60 @@ MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before s
 AS_RECORDED = {"ignore_editlist": "1"}  # times as the camera wrote them; movie_edits says which frames count
 
 
-def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
-    """Decode the frames with these timestamps, in ascending order.
+def read_movie(path: Path, timestamps: Sequence[int], numbers: Sequence[int] = ()) -> Iterator[CodedPicture]:
+    """Decode the frames with these timestamps, in ascending order; ``numbers`` are what the clip calls them.
 
     Raises PsvideoError where one of them cannot be decoded or does not come.
     """
-    wanted, unordered = deque(timestamps), ""
+    wanted = deque(timestamps)
     with opened_movie(path) as (container, stream):
-        if container.format.name == "avi" and not stream.codec_context.codec.intra_only:
-            unordered = ", or its frames are coded out of their order, which AVI does not say (repack it as .mkv)"
-        if wanted[0] > (stream.start_time or 0):
-            with contextlib.suppress(av.PermissionError):  # the index names no whole frame before: from the first on
-                container.seek(_safe_start(stream, wanted[0]), stream=stream)
-        for frame in container.decode(stream):
-            if frame.pts is None or frame.pts < wanted[0]:
-                continue
-            if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
-                break
-            yield rgb_codes(path, frame)
-            wanted.popleft()
-            if not wanted:
-                return
-    raise PsvideoError(
-        f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged "
-        f"there{unordered}. Copy it again, or choose other frames with `frames`."
+        tick_s, start = float(stream.time_base or 1), stream.start_time or 0
+        unordered = container.format.name == "avi" and not stream.codec_context.codec.intra_only
+        with contextlib.suppress(av.InvalidDataError):  # said below, of the frame that is waited for
+            for frame, damaged in _frames_from(container, stream, wanted[0]):
+                if frame.pts is None or frame.pts < wanted[0]:
+                    continue
+                if frame.pts > wanted[0] or damaged:
+                    break
+                yield rgb_codes(path, frame)
+                wanted.popleft()
+                if not wanted:
+                    return
+    where = f" {(wanted[0] - start) * tick_s:.3f} s from the start"
+    raise PsvideoError(_lost(path, where, numbers, done=len(timestamps) - len(wanted), unordered=unordered))
+
+
+def _frames_from(
+    container: InputContainer, stream: VideoStream, timestamp: int
+) -> Iterator[tuple[av.VideoFrame, bool]]:
+    """Decode frames from a timestamp or before it on, and say of each whether it is damaged: painted over."""
+    checks = SliceChecks() if stream.codec_context.codec.name == "ffv1" else None
+    broken: set[int | None] = set()
+    if timestamp > (stream.start_time or 0):
+        if checks:  # the movie's first packet shows whether there are checksums
+            checks.damaged(bytes(next(container.demux(stream))))
+        with contextlib.suppress(av.PermissionError):  # the index names no whole frame before: from the first on
+            container.seek(_safe_start(stream, timestamp), stream=stream)
+    for packet in container.demux(stream):
+        if checks and packet.size and checks.damaged(bytes(packet)):
+            broken.add(packet.pts)
+        yield from ((frame, frame.is_corrupt or frame.pts in broken) for frame in packet.decode())
+
+
+def _lost(path: Path, where: str, numbers: Sequence[int], *, done: int, unordered: bool) -> str:
+    """Say which frame cannot be decoded, ``done`` of those that were asked for lying before it, and what to do."""
+    frame = f"frame {numbers[done]}," if numbers else "the frame"
+    why = (
+        ", or its frames are coded out of their order, which AVI does not say (repack it as .mkv)" if unordered else ""
+    )
+    kept = (
+        f"go on with those before it, which are whole (`frames` {numbers[0]}-{numbers[done - 1]})"
+        if numbers and done
+        else "choose other frames with `frames`"
+    )
+    return (
+        f"{path}: {frame}{where}, cannot be decoded; the movie is truncated or damaged there{why}. Copy it again, or "
+        f"{kept}."
     )
 
 
