@@ -552,6 +552,27 @@ def test_a_lit_ball_that_leaves_the_picture_is_not_taken_for_lamps_that_flicker(
     assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).swing is None
 
 
+def test_a_subject_that_comes_in_from_the_side_is_not_taken_for_lamps_that_grow(make_plan: PlanMaker) -> None:
+    """A column that slides into the picture grows brighter in all its rows alike, as under lamps that do, first on the
+    side that some of them light: lamps were said to give more and less light by 9578 %."""
+    plan = make_plan(height_px=ROWS, width_px=4 * COLUMNS)
+    texture = 0.5 + np.random.default_rng(3).random((ROWS, 1))
+    col = np.arange(4 * COLUMNS) / (4 * COLUMNS)
+
+    def plate_of(flash: TrueFlash) -> np.ndarray:
+        across = (
+            0.05 + 0.9 * flash.start_s / (FRAMES * plan.camera.frame_period_s) - col
+        )  # from the subject's right edge
+        facing = (across, 1 - across, 0.5)[flash.slot % 3]
+        inside = np.clip(across * 4 * COLUMNS, 0, 1)
+        return np.asarray(
+            (flash.slot in plan.lit_slots) * 0.5 * texture * inside * np.clip(facing, 0.05, 1), np.float32
+        )
+
+    shot = expose(plate_of, plan, frames=FRAMES, clock=TrueClock(phase_s=0.0123, offset_ppm=30), noise=NOISE, bits=12)
+    assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).swing is None
+
+
 def test_a_subject_whose_bright_rows_grow_brighter_is_not_taken_for_a_camera_whose_gain_changes(plan: Plan) -> None:
     """A bust turned its chest to the lights and its face away. Its chest held nine tenths of the squares, so that one
     gain explained most of what changed."""

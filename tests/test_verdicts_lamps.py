@@ -170,6 +170,34 @@ def test_a_light_does_not_fail_where_only_the_value_changes_at_which_it_clips(di
     assert not any("flickers" in line.found for line in lamps(one))
 
 
+COMES_IN = np.array([0.02, 0.05, 0.12, 0.22, 0.36, 0.55, 0.72, 0.82, 0.92, 0.98, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+"""What a lamp on the other side gives of its usual light while a subject comes into the picture, (round,)."""
+
+
+@pytest.mark.parametrize(
+    ("moving", "breaks", "failed"),
+    [
+        (0.1, None, 0),  # the subject shows its other side first
+        (0.0, None, 5),  # nothing moved: it was the lamp, or a hand before it
+        (0.1, (9, 11, 0.2), 2),  # and a lamp that fails meanwhile, or goes out while all others change
+        (0.1, (2, 4, 0.05), 2),
+    ],
+)
+def test_a_lamp_does_not_fail_where_a_subject_turns_to_it_by_and_by(
+    moving: float, breaks: tuple[int, int, float] | None, failed: int
+) -> None:
+    levels = np.stack([0.24 * COMES_IN, 0.24 * (2 - COMES_IN), np.full(16, 0.3)], axis=1)
+    if breaks is not None:
+        first, after, left = breaks
+        levels[first:after, 1] *= left
+    one = Observed(lights=("a", "b", "c"), facts=KeptFacts(replace(o, moving_share=moving) for o in steady_but(levels)))
+    said = [line.found for line in judge_lamps(one) if "failed" in line.found]
+    assert len(said) == (failed > 0)
+    assert all(
+        f"in {failed} of 16 rounds" in line and f"light {'a' if breaks is None else 'b'!r}" in line for line in said
+    )
+
+
 def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> None:
     one = Footage(rounds=2).observed(0)
     one.counts[one.lights[0]] = np.zeros_like(one.counts[one.lights[0]])

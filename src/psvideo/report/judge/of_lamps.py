@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Doubles, Flags
 from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.swing import Swing
 from psvideo.model.units import listed
@@ -24,6 +25,11 @@ from psvideo.solve.normals.illumination import MAX_CONDITION
 
 MISSED = 0.5
 """A flash that gives less than this share of its lamp's usual light did not fire as it should."""
+AT_ONCE, GONE, OTHERS_STAY = 0.5, 0.1, 1.3
+"""Where the subject moves, lamps light more or less of it. One that fails beside that gives less than the first times
+what it does in the round before or after, while none of the others changes by more than the last, as a factor; or less
+than the second, whatever the others do. (A face that came into the picture from one side, at 1 px a flash: one lamp
+grew from 2 % of its usual light by 1.1 to 2.5 times a round.)"""
 
 
 def lamps(
@@ -106,8 +112,12 @@ def _missed(
             "picture, or no light fired. Their results are empty.",
             advice="Leave these frames out, or look at the strobe's log.",
         )
+    moving = np.array([bool(one.moving_share) for one in facts], np.bool_)
     for k, light in enumerate(lights):
-        numbers = [one.number for one, gone in zip(facts, missed[:, k] & ~empty, strict=True) if gone]
+        failed = _by_itself(
+            missed[:, k] & ~empty, level[:, k], np.delete(level, k, axis=1)[:, np.delete(alive, k)], moving
+        )
+        numbers = [one.number for one, gone in zip(facts, failed, strict=True) if gone]
         if alive[k] and numbers:
             yield Judgement(
                 subject="lights",
@@ -116,3 +126,23 @@ def _missed(
                 f"({listed(numbers, NAMED)}).",
                 advice="Check its driver and supply; these rounds' normals are wrong.",
             )
+
+
+def _by_itself(missed: Flags, level: Doubles, others: Doubles, moving: Flags) -> Flags:
+    """Return in which of the rounds that a lamp seems to have ``missed`` (round,) the lamp is to blame: all in which
+    nothing moves, and those that begin or end at once, as no subject does. ``level`` (round,) is its light, ``others``
+    (round, light) that of the lamps that fire."""
+    blamed = missed.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missed, [False]])))
+    for first, after in edges.reshape(-1, 2).tolist():
+        steps = [(first, first - 1), (after - 1, after)]
+        at_once = any(_at_once(level, others, *step) for step in steps if 0 <= step[1] < len(level))
+        blamed[first:after] = at_once or not moving[max(first - 1, 0) : after + 1].any()
+    return blamed
+
+
+def _at_once(level: Doubles, others: Doubles, inside: int, beside: int) -> bool:
+    """Return whether a lamp's light breaks off between two rounds that follow each other, and no other's does."""
+    kept = level[inside] / max(level[beside], 1e-12)
+    changes = np.log(np.maximum(others[inside], 1e-12) / np.maximum(others[beside], 1e-12))
+    return bool(kept < GONE or (kept < AT_ONCE and (np.abs(changes) < np.log(OTHERS_STAY)).all()))

@@ -43,6 +43,9 @@ ABRUPT = 0.25
 """Gains of one light jump from flash to flash where these jumps are this share of how far they stray at all: 0.03 to
 0.15 where spheres cross the picture, 0.5 and more where lamps flicker or their supply swings in less than five rounds.
 """
+SLOWLY_AT_MOST = 1.0
+"""Lamps that creep change by no more than this share; more than that by and by is a subject that comes or goes: a face
+that came in from the side, and grew brighter in all rows alike, gave a share of 96."""
 TURNS = 4
 """Flashes whose tails or rows overlap share what is left; so often it is dealt out again."""
 TOGETHER = 512
@@ -118,10 +121,12 @@ def swing_of(plan: Plan, found: ClipFit) -> Swing | None:
             each, rest_of_frames = _frames_apart(seen)
             flashes = _flashes_apart(seen)
             cause = _cause(rest_of_frames, flashes.rest)
+            share = _range(flashes.gain if cause == "lamps" else each)
             moves = cause == "lamps" and _rows_differ(blocks, flashes.rest)
-            if moves and not _abrupt(flashes):
+            comes = cause == "lamps" and share > SLOWLY_AT_MOST
+            if (moves or comes) and not _abrupt(flashes):
                 return None
-            return Swing(share=_range(flashes.gain if cause == "lamps" else each), cause="either" if moves else cause)
+            return Swing(share=share, cause="either" if moves else cause)
     return None
 
 
