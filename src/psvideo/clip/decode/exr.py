@@ -5,7 +5,7 @@ compositors write them; an alpha channel is left out. A picture whose data windo
 its display window is put in its place with 0 around it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -17,21 +17,19 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from psvideo.clip.decode.exr_channels import Choose, picture_channels
 from psvideo.clip.decode.exr_chunks import is_cut_short
 from psvideo.clip.decoded import CodedPicture, Header, shot_of
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 
-GREY_NAMES = ("Y", "L", "V")
 LUMINANCE = "the EXR files hold colour as differences (RY, BY), which are left out: they are read as grey (Y)"
-Choose = Callable[[list[list[str]]], tuple[int, tuple[str, ...]]]
-"""Takes the channels' names of every part, and returns a part's index and one or three of its names."""
 OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWindowWidth")
 
 
 def header(path: Path) -> Header:
     """Read what the file says without decoding its pixels."""
-    return header_of(path, partial(_picture_channels, path))
+    return header_of(path, partial(picture_channels, path))
 
 
 def header_of(path: Path, choose: Choose) -> Header:
@@ -42,7 +40,7 @@ def header_of(path: Path, choose: Choose) -> Header:
 
 def decode(path: Path) -> CodedPicture:
     """Decode a whole picture."""
-    return decode_channels(path, partial(_picture_channels, path))
+    return decode_channels(path, partial(picture_channels, path))
 
 
 def decode_channels(path: Path, choose: Choose) -> CodedPicture:
@@ -82,7 +80,7 @@ def read_halves(path: Path) -> Stored:
     What lies outside the data window is 0. Raises PsvideoError where the file is damaged or holds no one picture.
     """
     with _open(path, header_only=False) as file:
-        part, names = _picture_channels(path, _names(file))
+        part, names = picture_channels(path, _names(file))
         channels, head = file.channels(part), _header(file, part, names)
         planes = tuple(_in_display_window(channels[name].pixels, file.header(part), head) for name in names)
         return Stored(planes=planes, attributes=_lines(dict(file.header(part))))
@@ -151,33 +149,6 @@ def _open(path: Path, *, header_only: bool) -> Any:
 
 def _names(file: Any) -> list[list[str]]:
     return [[channel.name for channel in part.header["channels"]] for part in file.parts]
-
-
-def _picture_channels(path: Path, parts: list[list[str]]) -> tuple[int, tuple[str, ...]]:
-    """Find the picture: Y alone, or R, G and B, at the top level or in one layer, in the first part if it shows one."""
-    pictures = [(part, names) for part, found in enumerate(parts) for names in _pictures_in(found)]
-    nearest = [picture for picture in pictures if picture[0] == 0] or pictures
-    if len(nearest) == 1:
-        return nearest[0]
-    found = parts[0] if nearest and nearest[0][0] == 0 else [name for part in parts for name in part]
-    several = f"more than one {'layer' if found is parts[0] else 'picture'}" if nearest else "neither Y nor R, G, B"
-    raise PsvideoError(
-        f"{path}: holds {several} (channels {', '.join(sorted(found))}); expected one picture, in the channels "
-        "R, G, B or in Y. Write such a file from the layer that is meant."
-    )
-
-
-def _pictures_in(found: list[str]) -> list[tuple[str, ...]]:
-    layers = {name.rpartition(".")[0]: None for name in found}
-    return [names for layer in layers if (names := _picture_in(layer, found))]
-
-
-def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
-    prefix = f"{layer}." if layer else ""
-    colour = tuple(prefix + name for name in "RGB")
-    if all(name in found for name in colour):
-        return colour
-    return next(((prefix + name,) for name in GREY_NAMES if prefix + name in found), ())
 
 
 def _header(file: Any, part: int, names: tuple[str, ...]) -> Header:
