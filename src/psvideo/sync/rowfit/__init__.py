@@ -4,8 +4,8 @@
 ``kernel`` and ``projection`` the compiled model and its fit. ``unlit`` leaves out frames in the dark beforehand.
 ``refine`` sharpens by steps of ``normal_equations``, with ``standard_error`` for how certain times are. ``long_takes``:
 what holds throughout is fitted to some stretches of a long take, the clock to all of it. ``restarts`` says where a clip
-is to be cut because the strobe started again or stopped, ``moved_at_breaks`` where missing frames stand for that, and
-``strobed`` whether frames show one at all.
+is to be cut because the strobe started again or stopped, by ``leaps`` in its cycle, ``moved_at_breaks`` where missing
+frames stand for that, and ``strobed`` whether frames show one at all.
 
 Rooms, in the order in which a fit goes through them:
 
