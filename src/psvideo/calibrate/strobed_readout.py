@@ -16,7 +16,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.take_timing import find_timing
-from psvideo.sync.verdict.remarks import READOUT_FOUND
+from psvideo.sync.verdict.camera_remarks import READOUT_FOUND
 
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""

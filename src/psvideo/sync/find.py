@@ -27,15 +27,9 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.elsewhere import rows_open_at_once
+from psvideo.sync.verdict.few_kinds import in_step_with_frames, other_times_as_well, shows_the_same
 from psvideo.sync.verdict.overexposed import overexposed
-from psvideo.sync.verdict.refusal import (
-    clock_too_far,
-    in_step_with_frames,
-    nothing_to_find,
-    other_times_as_well,
-    shows_the_same,
-    why_not,
-)
+from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
 
 ADVICE = (
     "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the lights "

@@ -15,7 +15,8 @@ from psvideo.sync.named_strobe import FoundStrobe
 from psvideo.sync.unfired import only_fired
 from psvideo.sync.unfired_words import remarks_on_unfired
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
-from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
+from psvideo.sync.verdict.light_remarks import remarks_on_lights
+from psvideo.sync.verdict.remarks import remarks
 from psvideo.sync.verdict.split_flashes import half_flash
 from psvideo.sync.verdict.swinging import swing_of
 

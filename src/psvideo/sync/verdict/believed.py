@@ -14,7 +14,8 @@ from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.rowfit.standard_error import freedom
 from psvideo.sync.rowfit.tracking.course import too_many
 from psvideo.sync.verdict.elsewhere import fits_elsewhere
-from psvideo.sync.verdict.refusal import MOST_PPM, shows_the_same
+from psvideo.sync.verdict.few_kinds import shows_the_same
+from psvideo.sync.verdict.refusal import MOST_PPM
 from psvideo.sync.verdict.rivals import (
     BETTER,
     CLEARLY,

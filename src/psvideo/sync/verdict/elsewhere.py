@@ -24,7 +24,7 @@ from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
-from psvideo.sync.verdict.refusal import shows_few
+from psvideo.sync.verdict.few_kinds import shows_few
 
 SHORT = 3.0
 """Rows open at nearly the same time where the readout is no longer than this many of the shortest flash."""
