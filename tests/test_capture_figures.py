@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from psvideo.capture.drawing.timeline import timeline
 from psvideo.model.camera import Camera
-from psvideo.model.cost.shoot_figures import dark_row_move_px, frames_per_flash, mixed_share, row_shares, shoot_figures
+from psvideo.model.cost.rows_of_flashes import dark_row_move_px, frames_per_flash, mixed_share, row_shares
+from psvideo.model.cost.shoot_figures import shoot_figures
 from psvideo.model.plan import Mode, Plan, PlannedFlash
 
 

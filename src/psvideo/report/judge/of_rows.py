@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from psvideo.model.cost.in_step import IN_STEP, blind_share, dark_s_out_of_step, frames_in_step, never_shown
-from psvideo.model.cost.shoot_figures import mixed_share
+from psvideo.model.cost.rows_of_flashes import mixed_share
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import counted, listed

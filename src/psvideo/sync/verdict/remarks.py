@@ -1,6 +1,6 @@
 """What people should know of a clip whose strobe was found: what to distrust, and what to put right in its plan."""
 
-from psvideo.model.cost.shoot_figures import mixed_share
+from psvideo.model.cost.rows_of_flashes import mixed_share
 from psvideo.model.half_flash import HalfFlash
 from psvideo.model.plan import Plan
 from psvideo.model.swing import Swing
