@@ -29,7 +29,8 @@ from psvideo.solve.normals.least_squares.woodham1980 import solve
 from psvideo.solve.normals.loops import near_kernel
 from psvideo.solve.normals.robust import robust_kernel
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.profiles import Profiles, compiled_rows
+from psvideo.sync.rowfit.compiled_profiles import compiled_rows
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.synth import read_scene
 
 SOURCE = Path(psvideo.__file__).parent

@@ -22,7 +22,8 @@ from psvideo.runs.sync import sync
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit import kernel
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_between
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]

@@ -16,7 +16,8 @@ from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import first_guess
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes, compiled_rows, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit, robust_loss
 from psvideo.sync.rowfit.row_model import seen_of
 from psvideo.sync.rowfit.tracking.false_holes import without_false_holes

@@ -21,7 +21,8 @@ from psvideo.compute.threads import THREADS, in_order, over_ranges, thread_count
 from psvideo.errors import UsageError
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.profiles import WORTH_A_THREAD, Profiles, equations
+from psvideo.sync.rowfit.compiled_profiles import WORTH_A_THREAD, equations
+from psvideo.sync.rowfit.profiles import Profiles
 
 COUNTS = (1, 3, 8)
 TALL = f"""

@@ -13,7 +13,7 @@ from psvideo.model.plan import Plan
 from psvideo.pictures.contact import GAP_PX
 from psvideo.pictures.timing_sheet import COLOURS, DARK, SIDE_PX, timing_picture
 from psvideo.sync.find import timing_from_rows
-from psvideo.sync.rowfit.profiles import residuals_of
+from psvideo.sync.rowfit.compiled_profiles import residuals_of
 from psvideo.synth import TrueClock, expose
 
 

@@ -10,7 +10,7 @@ from psvideo.model.arrays import Doubles, Pixels
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.pictures.contact import BACKGROUND, FAINT_INK, GAP_PX, INK, Strip, Tile, sheet, write_line
-from psvideo.sync.rowfit.profiles import residuals_of
+from psvideo.sync.rowfit.compiled_profiles import residuals_of
 
 MOST_FRAMES = 120
 SHEET_PX, SIDE_PX, BELOW_PX = 1440, 62, 24

@@ -16,8 +16,9 @@ from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash
 from psvideo.sync.flashes_seen import fitted_camera
 from psvideo.sync.rowfit import row_model
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, compiled_flashes, compiled_rows, predictions
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, compiled_rows, predictions
+from psvideo.sync.rowfit.profiles import Profiles
 
 ROWS = 60
 BLACK, LIT = 0.1, 0.1

@@ -9,8 +9,8 @@ import numpy as np
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.sync.restarted import MIXED
+from psvideo.sync.rowfit.compiled_profiles import brightnesses
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import brightnesses
 from psvideo.sync.rowfit.tracking.losses import losses_of
 from psvideo.sync.turns import TURN_ROWS, turned
 

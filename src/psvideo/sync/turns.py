@@ -14,7 +14,8 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.marker import alike_turns, turned_slot
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, train_between
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import CAUCHY, refined_beat, row_noise
 
 TURN_ROWS = 48

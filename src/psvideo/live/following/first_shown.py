@@ -14,7 +14,8 @@ from psvideo.live.following.lock import Lock
 from psvideo.live.following.window import HeldFrame, window_of
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses
+from psvideo.sync.rowfit.compiled_profiles import brightnesses
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
 
 

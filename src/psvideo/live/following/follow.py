@@ -23,7 +23,8 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.seed import GOOD_SEED
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.steps_ahead import LEAST
 
 State = Literal["seeking", "locked", "unsure", "lost"]

@@ -11,7 +11,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, predictions
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import CAUCHY, LAST_SCALE
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
 from psvideo.sync.rowfit.tracking.steps_ahead import MOST as MOST_MISSING

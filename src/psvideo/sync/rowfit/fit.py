@@ -9,8 +9,9 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import regular_step, stood_in
 from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack

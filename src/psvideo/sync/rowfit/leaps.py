@@ -7,8 +7,9 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.compiled_profiles import brightnesses
 from psvideo.sync.rowfit.moved_at_breaks import moved
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of

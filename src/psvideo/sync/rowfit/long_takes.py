@@ -12,7 +12,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import CAUCHY, Fit, errors_of_residuals, explained
 from psvideo.sync.rowfit.unknowns.bend import fitted, late_s
 

@@ -14,8 +14,9 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit, refine, refined_beat, robust_loss
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS
 from psvideo.sync.rowfit.tracking.losses import frame_losses

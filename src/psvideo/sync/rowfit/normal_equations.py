@@ -7,7 +7,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, equations
+from psvideo.sync.rowfit.compiled_profiles import equations
+from psvideo.sync.rowfit.profiles import Profiles
 
 DAMPING = 1e-10
 """This share of every unknown's own precision is added: rows may show two unknowns together, and neither alone."""

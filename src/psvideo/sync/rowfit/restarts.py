@@ -16,10 +16,11 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import stood_in
 from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, unexplained
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.leaps import FINE_PARTS, LEAST_AFTER, leap
 from psvideo.sync.rowfit.moved_at_breaks import TICKS, moved
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.strobed import lost_somewhere, shows_strobe
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, memory_frames

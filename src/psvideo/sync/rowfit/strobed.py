@@ -12,8 +12,9 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, window_frames
 
 EXPLAINED = 0.5

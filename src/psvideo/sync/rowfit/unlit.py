@@ -11,7 +11,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, twins
-from psvideo.sync.rowfit.profiles import Profiles, slot_unknowns
+from psvideo.sync.rowfit.compiled_profiles import slot_unknowns
+from psvideo.sync.rowfit.profiles import Profiles
 
 DARK, FLOOR = 0.02, 0.02
 """A frame is dark whose rows lie above their darkest, a quantile of each, by less than half this share of their spreads

@@ -8,8 +8,9 @@ import numpy as np
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, Seed, gain_of
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.fit import ClipFit, find
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.rowfit.standard_error import freedom
 from psvideo.sync.rowfit.tracking.course import too_many

@@ -21,8 +21,9 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_between
 from psvideo.sync.rowfit.coarse.search import search
 from psvideo.sync.rowfit.coarse.seed import first_guess
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.verdict.few_kinds import shows_few
 

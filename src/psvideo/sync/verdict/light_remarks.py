@@ -9,8 +9,8 @@ from psvideo.model.cost.in_step import IN_STEP, never_shown
 from psvideo.model.plan import Plan
 from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.compiled_profiles import brightnesses
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import brightnesses
 
 UNFIRED = 0.01
 """Share of the brightest light's level below which a light is said not to have fired."""

@@ -8,7 +8,8 @@ from psvideo.model.plan import Plan
 from psvideo.model.units import counted
 from psvideo.sync.rowfit.coarse.search import GridPlace, search
 from psvideo.sync.rowfit.coarse.seed import first_guess, gain_of
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.verdict.rivals import CLEARLY, Rival, best_rival, count_rivals, likely_rates, strobe_rivals
 
 WRONG_PERIOD_GAIN = 0.6

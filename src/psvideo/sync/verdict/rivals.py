@@ -14,8 +14,9 @@ import numpy as np
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.search import search
 from psvideo.sync.rowfit.coarse.seed import LEAST_REACH_PPM, SEED_ROWS, first_guess, gain_of, seeded
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 
 SHUTTERS_DEG = (360.0, 270.0, 240.0, 216.0, 180.0, 172.8, 144.0, 120.0, 90.0, 72.0, 60.0, 45.0, 22.5, 11.25)
 SHUTTERS_S = tuple(1.0 / n for n in (24, 25, 30, 48, 50, 60, 96, 100, 120, 125, 160, 200, 240, 250, 500, 1000))

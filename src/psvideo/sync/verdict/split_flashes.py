@@ -14,8 +14,9 @@ from psvideo.compute.ranks import median, quantile
 from psvideo.model.arrays import Doubles, Flags, Integers
 from psvideo.model.half_flash import HalfFlash
 from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.row_model import Flashes
 
 WHOLE_SHUTTER, NEARLY = 0.98, 0.999

@@ -17,8 +17,9 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.model.swing import Cause, Swing
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, compiled_flashes, predictions
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, predictions
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.row_model import Flashes
 from psvideo.sync.rowfit.tracking.misfires import SeenFlashes, frames_seeing, seen_flashes
 

@@ -20,7 +20,8 @@ from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.readout_kernel import least_over_readouts
 from psvideo.sync.rowfit.coarse.search_kernel import losses_of_any, losses_of_square
 from psvideo.sync.rowfit.coarse.seen_shares import LANES
-from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
+from psvideo.sync.rowfit.compiled_profiles import compiled_rows, rows_of_a_part, slot_unknowns
+from psvideo.sync.rowfit.profiles import Profiles
 
 ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""

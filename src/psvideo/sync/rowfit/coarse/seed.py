@@ -20,7 +20,8 @@ from psvideo.sync.rowfit.coarse.retime import (
 )
 from psvideo.sync.rowfit.coarse.rounds_first import search_coded
 from psvideo.sync.rowfit.coarse.search import search
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 from psvideo.sync.rowfit.unlit import copies

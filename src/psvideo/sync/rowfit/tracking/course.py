@@ -9,7 +9,8 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.retime import regular_step
 from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.ends import ends
 from psvideo.sync.rowfit.tracking.false_holes import without_false_holes
 from psvideo.sync.rowfit.tracking.holes import NEAR, settled, with_repeats

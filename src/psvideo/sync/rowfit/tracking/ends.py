@@ -11,7 +11,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses
+from psvideo.sync.rowfit.compiled_profiles import brightnesses
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.holes import MEMORY
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
 from psvideo.sync.rowfit.tracking.misfires import losses_but_for_misfires

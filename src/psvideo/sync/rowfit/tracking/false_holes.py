@@ -12,7 +12,8 @@ import numpy as np
 from psvideo.model.arrays import Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.tracking.holes import MEMORY
 from psvideo.sync.rowfit.tracking.losses import frame_losses

@@ -7,7 +7,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 from psvideo.sync.rowfit.tracking.steps_ahead import due
 from psvideo.sync.rowfit.tracking.track import FrameTrack

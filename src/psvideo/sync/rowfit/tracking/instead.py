@@ -14,7 +14,8 @@ from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import row_model
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, compiled_flashes, compiled_rows
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, compiled_flashes, compiled_rows
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.holes import MEMORY, NATURAL
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 from psvideo.sync.rowfit.tracking.track import FrameTrack

@@ -6,7 +6,8 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.search import ROBUST_STEEPNESS
-from psvideo.sync.rowfit.profiles import Profiles, predictions
+from psvideo.sync.rowfit.compiled_profiles import predictions
+from psvideo.sync.rowfit.profiles import Profiles
 
 SUSPICIOUS = 0.25
 """A frame's loss by which it must exceed what is usual before other places in time are tried for it."""

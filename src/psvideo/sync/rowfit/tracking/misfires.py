@@ -13,7 +13,8 @@ from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import Pulse
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, predictions
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes, predictions
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.losses import frame_losses
 
 COST = 0.5

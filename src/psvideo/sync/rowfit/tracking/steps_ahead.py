@@ -12,7 +12,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, predictions, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
 from psvideo.sync.rowfit.tracking.misfires import losses_but_for_misfires
 from psvideo.sync.rowfit.tracking.missing_instead import rather_missing

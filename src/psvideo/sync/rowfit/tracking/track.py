@@ -14,7 +14,8 @@ from psvideo.model.arrays import Doubles, Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import twins as twin_frames
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses
 from psvideo.sync.rowfit.tracking.steps_ahead import BLOCK, Twins, steps_ahead, with_steps

@@ -11,8 +11,9 @@ import numpy as np
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.normal_equations import projected
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import CAUCHY, EDGES, GLOBALS, Fit, errors_of_residuals, explained, refine, times_moved
 from psvideo.sync.rowfit.standard_error import believable, mean_error, standard_error_of
 

@@ -14,7 +14,8 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.compiled_profiles import unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import EDGES, Fit, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.misread import CLIPPED

@@ -15,7 +15,8 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import projection
 from psvideo.sync.rowfit.coarse.seed import gain_of
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes, compiled_rows, equations
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, errors_of_residuals
 from psvideo.sync.rowfit.row_model import Flashes, places
 

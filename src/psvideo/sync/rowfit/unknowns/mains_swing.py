@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.model.rows.ripple import MOST_SWING, Ripple
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses
+from psvideo.sync.rowfit.compiled_profiles import brightnesses
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
 
 MAINS_OFF_HZ = 0.5

@@ -14,7 +14,8 @@ from psvideo.compute.compiled import EXACT
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes, compiled_rows, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import LAST_SCALE, Fit, robust_loss
 from psvideo.sync.rowfit.row_model import Flashes, Rows, lent_flashes, lent_rows, seen_of
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
+from psvideo.sync.rowfit.compiled_profiles import brightnesses, predictions, unexplained
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import CAUCHY, Fit, errors_of_residuals, robust_loss
 
 NEAR_ROWS = 1.0

@@ -8,7 +8,8 @@ that changes and a subject that moves shift the two against one another.
 import numpy as np
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes
+from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.rowfit.unknowns.jitter import ENOUGH, SURE, Jitter, moved_flashes, pulls
 
