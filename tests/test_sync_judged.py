@@ -631,6 +631,24 @@ def test_edges_are_not_called_soft_while_the_camera_s_gain_swings(plan: Plan, mo
     assert not any("are soft" in one for one in remarks(plan, soft, swing=swing))
 
 
+def test_edges_that_are_softer_by_a_twentieth_of_a_row_are_not_called_soft(
+    plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of sharp edges in files that cut black off: LEDs of no rise time were said to take 1 us, 0.03 row."""
+    asked = list[Any]()
+
+    def kept(_: Plan, found: Any, *, swing: Any, half: Any) -> tuple[str, ...]:
+        asked.append(found)
+        return ()
+
+    monkeypatch.setattr(frames_taken, "remarks", kept)
+    timing_of(plan, filmed(plan))
+    (found,) = asked
+    for rows, said in ((0.05, False), (0.15, True)):
+        soft = replace(found, soft_s=rows * abs(found.fit.beat.row_time_s))
+        assert any("are soft" in one for one in remarks(plan, soft, swing=None)) is said
+
+
 def test_what_comes_into_the_picture_is_named_beside_a_gain_that_would_explain_it() -> None:
     assert "something bright comes or goes" in Swing(share=0.07, cause="either").sentence
 
