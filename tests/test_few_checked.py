@@ -115,6 +115,7 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
     points = SubjectPoints(
         measured=measured,
         counts=np.ones_like(measured),
+        seen=np.ones_like(measured),
         towards=np.repeat(FOUR[:, None], len(truth), axis=1),
         half=np.repeat(half[:, None], len(truth), axis=1),
         to_camera=np.broadcast_to(UP, truth.shape),
@@ -127,6 +128,7 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
     flat = SubjectPoints(
         measured=0.5 * c.T + rng.normal(0, 0.002, c.T.shape),
         counts=points.counts,
+        seen=points.seen,
         towards=points.towards,
         half=points.half,
         to_camera=points.to_camera,

@@ -10,6 +10,7 @@ from clips_in_pieces import filmed, same_in_pieces
 import psvideo as ps
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_folders import begun_folder, whole_folder
+from psvideo.model.surface import Metal, Reflectance, Subject
 from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
@@ -20,7 +21,7 @@ from psvideo.report.observe.rig_and_curve.rigpoints import PointLight
 from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.runs.instants.job import Found
-from psvideo.runs.instants.piece_notes import noted, write_notes
+from psvideo.runs.instants.piece_notes import note_subject, noted, noted_subject, write_notes
 from psvideo.runs.instants.pieces import piece_named
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.replies import Identity
@@ -83,6 +84,32 @@ def test_every_number_that_was_noted_of_a_round_comes_back_and_follows_those_bef
     assert {name: getattr(one.closely, name) for name in names} == {
         name: [0.25 + n] * 2 for n, name in enumerate(names)
     }
+
+
+METAL = Metal((0.25, *(0.0,) * 14, 1 / 3, 0.1), ((0.5,) * 17, (0.1 + 0.2,) * 17), 1e-4 / 3)
+
+
+@pytest.mark.parametrize(
+    "subject",
+    [
+        Subject(reflectance=None),
+        Subject(reflectance=Reflectance(1 / 3, 0.0, 0.1, 0.2, 0.3, 0.7), metal=METAL),
+        Subject(reflectance=None, metal=METAL),
+    ],
+)
+def test_pieces_take_the_subject_for_what_the_first_of_them_found(tmp_path: Path, subject: Subject) -> None:
+    assert noted_subject(tmp_path) is None
+    note_subject(tmp_path, subject)
+    note_subject(tmp_path, Subject(reflectance=Reflectance(*(0.5,) * 6)))
+    assert noted_subject(tmp_path) == subject
+
+
+def test_a_damaged_note_of_the_subject_is_refused_by_name(tmp_path: Path) -> None:
+    note_subject(tmp_path, Subject(reflectance=None, metal=METAL))
+    path = tmp_path / ".pieces" / "subject.json"
+    path.write_text(path.read_text().replace("0.25", '"much"'))
+    with pytest.raises(PsvideoError, match=r"subject\.json: cannot be read .* Remove it"):
+        noted_subject(tmp_path)
 
 
 def test_damaged_notes_are_refused_by_name(tmp_path: Path) -> None:

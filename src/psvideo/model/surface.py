@@ -30,12 +30,28 @@ class Reflectance(NamedTuple):
     narrow: float
 
 
+class Metal(NamedTuple):
+    """What bare metal, and paint full of metal flakes, shows under a light, every pixel in a scale of its own.
+
+    shown: shares of n . l, of lobes h^2, h^4, h^8 up to h^256, and of the same times n . l; h is n . half way between
+        light and camera. They sum up to 1.
+    rivals: the same of one kind of lobes alone; where their normals differ from those of all, nothing tells which is
+        right.
+    unlike: what ``shown`` leaves of a typical pixel's square roots of brightness, as a share of their squares.
+    """
+
+    shown: tuple[float, ...]
+    rivals: tuple[tuple[float, ...], ...]
+    unlike: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Subject:
     """What the rounds of a take share of their subject. ``reflectance``: beyond n . l, None where that explains little
-    and the subject counts as matte."""
+    and the subject counts as matte. ``metal``: what it shows in n . l's place, None where it is none."""
 
     reflectance: Reflectance | None
+    metal: Metal | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,6 +27,7 @@ from psvideo.solve.at_rest import AtRest
 from psvideo.solve.depth import View, view_of
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.metal.metal_fit import metal_of
 from psvideo.solve.normals.plate_noise import spread_of
 from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
@@ -97,7 +98,8 @@ def subject_of(
     Arguments are those of ``surfaces``."""
     solver = _RoundSolver.of(plan, rig, masks=masks, solving=solving, near=near, falloff=falloff)
     looks = [*map(solver.look, filter(lambda one: one.lights == plan.lights, gathered))]
-    return Subject(reflectance=reflectance_of([one for one in looks if one is not None])) if looks else None
+    known = [one for one in looks if one is not None]
+    return Subject(reflectance=reflectance_of(known), metal=metal_of(known)) if looks else None
 
 
 @dataclass(frozen=True, kw_only=True)

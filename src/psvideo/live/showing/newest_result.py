@@ -90,7 +90,7 @@ class NewestResults:
         camera, lights = plan.camera, lights_as_planned(rig, plan)
         near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
         known = self._subject if self._solved % LOOKED_AGAIN else None
-        solving = Solving(grid_px=GRID_PX, subject=known)
+        solving = Solving(grid_px=GRID_PX, subject=known, metal=False)
         solved = surfaces([one], plan, rig, solving=solving, near=near, one_by_one=True)
         surface = next((instant.surface for instant in solved), None)
         if surface is not None:

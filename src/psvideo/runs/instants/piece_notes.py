@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
-from psvideo.model.surface import Reflectance, Subject
+from psvideo.model.surface import Metal, Reflectance, Subject
 from psvideo.model.timing import Timing
 from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
@@ -32,6 +32,7 @@ BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
 CLOSE_LOOKS = TypeAdapter(CloseLooks)
+METAL = TypeAdapter(Metal)
 
 
 def write_notes(folder: Path, numbers: range, found: Found) -> None:
@@ -86,7 +87,7 @@ def note_subject(folder: Path, subject: Subject) -> None:
     """Note what all pieces take the subject for, unless one did before."""
     path = folder / FOLDER / SUBJECT
     if not path.is_file():
-        write_text(path, json.dumps({"reflectance": subject.reflectance}))
+        write_text(path, json.dumps({"reflectance": subject.reflectance, "metal": subject.metal}))
 
 
 def noted_subject(folder: Path) -> Subject | None:
@@ -95,9 +96,13 @@ def noted_subject(folder: Path) -> Subject | None:
     if not path.is_file():
         return None
     try:
-        known = json.loads(path.read_text(encoding="utf-8"))["reflectance"]
-        return Subject(reflectance=None if known is None else Reflectance(*map(float, known)))
-    except (OSError, ValueError, KeyError, TypeError) as fault:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        known, metal = record["reflectance"], record["metal"]
+        return Subject(
+            reflectance=None if known is None else Reflectance(*map(float, known)),
+            metal=None if metal is None else METAL.validate_python(metal),
+        )
+    except (OSError, ValueError, KeyError, TypeError, ValidationError) as fault:
         raise PsvideoError(f"{path}: cannot be read ({fault}). {_ADVICE}") from fault
 
 

@@ -81,8 +81,9 @@ PICTURES = (
     SmallPictures(lights=3, colour=True),
     SmallPictures(lights=8, colour=True, near=True),
     SmallPictures(lights=8),
+    SmallPictures(lights=8, metal=True),
 )
-"""What a caller from Python may hand over: few lights and many, near and far, in colour and grey."""
+"""What a caller from Python may hand over: few lights and many, near and far, in colour and grey, matte and metal."""
 
 
 def solve_small() -> None:

@@ -18,6 +18,7 @@ class SmallPictures:
     lights: int
     colour: bool = False
     near: bool = False
+    metal: bool = False
 
     @property
     def rig(self) -> Rig:
@@ -41,6 +42,10 @@ class SmallPictures:
         y, x = np.mgrid[-0.6 : 0.6 : self.size_px * 1j, -0.6 : 0.6 : self.size_px * 1j]
         normals = np.stack([x, -y, np.sqrt(1 - x * x - y * y)], axis=-1)
         shade = 0.5 * np.maximum(np.einsum("rcx,lx->lrc", normals, self.directions), 0)
+        if self.metal:
+            half = self.directions + np.array((0.0, 0.0, 1.0))
+            half /= np.linalg.norm(half, axis=1, keepdims=True)
+            shade = 0.05 * shade + 0.5 * np.maximum(np.einsum("rcx,lx->lrc", normals, half), 0) ** 12
         return np.asarray(np.stack([shade] * 3, axis=-1) if self.colour else shade, np.float32)
 
     @property

@@ -11,5 +11,6 @@ Rooms, from the bottom up:
 - ``loops``: compiled loops that all solvers use, from samples to measurements and from a solution to what is stored
 - ``least_squares``: the classic solver, for matte surfaces without cast shadows
 - ``robust``: the default, which leaves out shadows and highlights
+- ``metal``: plates of bare metal, made as a matte surface would show them, for those above to solve
 - ``trust``: how far normals may be off, and which are valid
 """

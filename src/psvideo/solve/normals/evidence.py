@@ -41,7 +41,8 @@ class Evidence:
     ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
     ``moves`` (row, col), on that grid, where something was followed; ``steadied``: beside that plates were brought
     together by one shift of the whole picture. ``indirect`` is what the solver saw on its way, and ``left``, where
-    plates are unsure. ``grid_px`` is how many points there are at most along the longer side.
+    plates are unsure. ``metal_deg`` is by how much normals of metal may be off because what it shows is not known
+    better, at these points. ``grid_px`` is how many points there are at most along the longer side.
     """
 
     plates: Sequence[Samples] | Sequence[Mixture]
@@ -54,6 +55,7 @@ class Evidence:
     steadied: bool = False
     indirect: Indirect | None = None
     left: Left | None = None
+    metal_deg: Floats | None = None
     black_level: float = 0.0
     scale: float = 1.0
     spare: Path | None = None

@@ -9,7 +9,7 @@ import numpy as np
 
 from psvideo.model.arrays import Floats, Mask
 from psvideo.model.choices import Solver
-from psvideo.model.surface import Subject, Surface
+from psvideo.model.surface import Metal, Subject, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
@@ -36,6 +36,8 @@ INDIRECT = 0.2
 """Below this share of the pixel's mean, light in shadow may come from neighbouring surfaces: where many measurements
 are brighter it is left out. (Of a surface of albedo 0.5 a wide crease sends back as much.)"""
 EVERYTHING = Reweighting(most_error_deg=EVERYTHING_DEG)
+MATTE = Subject(reflectance=None)
+"""What metal's plates show once they are as a matte surface would show them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +56,7 @@ class Solving:
     spare: Path | None = None
     grid_px: int = GRID_PX
     subject: Subject | None = None
+    metal: bool = True
 
     def method(self, lights: int) -> Method:
         """Return the solver for this many lights."""
@@ -97,9 +100,14 @@ class Solving:
         from psvideo.solve.filling.filled import filled
         from psvideo.solve.filling.leaving_out import left_out
 
-        solved, one, noise = self.measured(
+        how, metal_deg = self, None
+        if (metal := self._metal(plates, lit, seen=seen, mask=mask, unsure=unsure)) is not None:
+            plates, metal_deg = self._as_matte(plates, lit, metal, seen=seen, mask=mask, unsure=unsure)
+            how = replace(self, subject=MATTE)
+        solved, one, noise = how.measured(
             plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied, noise=before.known_noise
         )
+        one = replace(one, metal_deg=metal_deg)
         known, doubts = judged(solved, one, noise, before=before)
         without = left_out(known, one, solved=solved.valid) if self.fill else None
         known = replace(
@@ -111,6 +119,32 @@ class Solving:
         del solved  # residuals that nobody asked for are gone with it
         whole = filled(known, one, solved=valid, noise=noise.dark, without=without) if self.fill else emptied(known)
         return with_unchecked(whole, one, noise), doubts
+
+    def _metal(
+        self, plates: Plates, lit: Illumination, *, seen: Mask | None, mask: Mask | None, unsure: Floats | None
+    ) -> Metal | None:
+        """Return what the subject shows as metal; None where it is none, or is not asked for it."""
+        from psvideo.solve.normals.metal.metal_fit import LIGHTS_FOR_METAL, metal_of
+
+        if not self.metal or len(plates) < LIGHTS_FOR_METAL or not self.looks_at_subject(len(plates)):
+            return None
+        if self.subject is not None:
+            return self.subject.metal
+        points = self.look(plates, lit, seen=seen, mask=mask, unsure=unsure)
+        return None if points is None else metal_of([points])
+
+    def _as_matte(
+        self, plates: Plates, lit: Illumination, metal: Metal,
+        *, seen: Mask | None, mask: Mask | None, unsure: Floats | None,
+    ) -> tuple[Plates, Floats]:  # fmt: skip
+        """Return plates as a matte surface with the same normals would show them, and by how much these may be off for
+        what is not known of the metal."""
+        from psvideo.solve.normals.metal.matte_plates import matte_plates, metal_doubt_deg
+
+        solved, one, _ = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure)
+        step = one.step_of(solved.valid.shape)
+        doubt = metal_doubt_deg(plates, lit, metal, solved, one.usable, seen=seen, step=step)
+        return matte_plates(plates, lit, metal, solved, one.usable, seen=seen, mask=mask), doubt
 
     def look(
         self,

@@ -86,6 +86,7 @@ def _points(
     return SubjectPoints(
         measured=measured,
         counts=(here & (measured > least)).astype(float),
+        seen=here.astype(float),
         towards=towards,
         half=half,
         to_camera=to_camera,

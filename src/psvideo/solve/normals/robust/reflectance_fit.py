@@ -97,11 +97,13 @@ by 3 to 10 degrees where the other does not. Softness has to explain more than e
 @dataclass(frozen=True, kw_only=True)
 class SubjectPoints:
     """Points of the subject: measurements (light, point) in units of every light's strength, which of them count
-    (0 or 1), directions to the lights (light, point, 3), and half way from there to the camera; ``to_camera``
-    (point, 3); and ``normals`` (point, 3) as the points were solved without a model."""
+    (0 or 1), and which are seen and not clipped, dark or not; directions to the lights (light, point, 3), and half way
+    from there to the camera; ``to_camera`` (point, 3); and ``normals`` (point, 3) as the points were solved without a
+    model."""
 
     measured: Doubles
     counts: Doubles
+    seen: Doubles
     towards: Doubles
     half: Doubles
     to_camera: Doubles
@@ -112,6 +114,7 @@ class SubjectPoints:
         return SubjectPoints(
             measured=self.measured[:, known],
             counts=self.counts[:, known],
+            seen=self.seen[:, known],
             towards=self.towards[:, known],
             half=self.half[:, known],
             to_camera=self.to_camera[known],
@@ -130,6 +133,7 @@ def joined(looks: Sequence[SubjectPoints]) -> SubjectPoints:
     return SubjectPoints(
         measured=np.concatenate([one.measured for one in looks], axis=1),
         counts=np.concatenate([one.counts for one in looks], axis=1),
+        seen=np.concatenate([one.seen for one in looks], axis=1),
         towards=np.concatenate([one.towards for one in looks], axis=1),
         half=np.concatenate([one.half for one in looks], axis=1),
         to_camera=np.concatenate([one.to_camera for one in looks]),
@@ -162,7 +166,7 @@ def _worst_fitting(points: SubjectPoints) -> SubjectPoints:
     sizes = sizes[sizes > 0]
     if not len(sizes):
         return points
-    left = _left(points, points.counts, _parts(points, points.normals * sizes[:, None], median(sizes)))[0]
+    left = _left(points, points.counts, parts_of(points, points.normals * sizes[:, None], median(sizes)))[0]
     free = points.counts.sum(axis=0) - 3
     squares = np.where(free > 0, (points.counts * left**2).sum(axis=0) / np.maximum(free, 1), 0.0)
     return points.only(squares >= np.quantile(squares, 1 - WORST))
@@ -262,7 +266,7 @@ def explained_evenly(points: SubjectPoints, g: Doubles, typical: float, model: D
     """Return which share of the squares of what is left over a model explains, where no measurement counts less than
     others but for OUTLYING times what is typical: what weights found in noise is gone."""
     points = points.in_order()
-    parts = _parts(points, g, typical)
+    parts = parts_of(points, g, typical)
     left = _left(points, points.counts, parts)
     most = OUTLYING**2 * float((points.counts * left[0] ** 2).sum() / max(points.counts.sum(), 1))
     rest = left[0] - np.tensordot(model, left[1:], axes=1)
@@ -286,7 +290,7 @@ def _medians(values: Doubles, counts: Mask) -> Doubles:
     return np.where(number > 0, (lower + upper) / 2, 0.0)
 
 
-def _parts(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlace = InPlace()) -> Doubles:
+def parts_of(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlace = InPlace()) -> Doubles:
     """Return what was measured, in albedos, and what each number of the model would add, (part, light, point)."""
     from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
 
@@ -311,7 +315,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, sought: Sought) ->
     """
     from psvideo.solve.normals.robust.reflectance_kernel import add_squares
 
-    parts = _parts(points, g, typical, sought.in_place)
+    parts = parts_of(points, g, typical, sought.in_place)
     weights, model, spread = points.counts, np.zeros(NUMBERS), 1.0
     left, square, right = parts, np.empty((NUMBERS, NUMBERS)), np.empty(NUMBERS)
     for turn in range(REWEIGHTED):

@@ -78,7 +78,7 @@ def judged(
     if misfit is not None and points.known.any():
         misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, shown.lost_deg), near, how)
     doubt = shown.doubt_deg
-    for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
+    for more in (moving, near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, shown.usual_deg])
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)

@@ -1,0 +1,129 @@
+"""Plates of metal, as a matte surface with the same normals would show them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.threads import over_ranges
+from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.model.surface import Metal, Surface
+from psvideo.plates.mixing.mixture import Mixture
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.metal.metal_fit import FARTHEST_DEG, directions
+from psvideo.solve.normals.noise_samples import rows_of
+from psvideo.solve.normals.robust.reflectance import points_at
+from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.task import Samples, Usable
+
+MOST_LEFT = 0.5
+"""A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""
+MISFIT = 2.5
+"""A normal may be turned by so many times the angle that lobes leave of a typical pixel's light."""
+LEAST_DOUBT_DEG = 2.0
+"""Where lobes of either kind agree and leave next to nothing, normals are still so far off."""
+APART_DEG = 10.0
+"""Between the normals from which each pixel's is looked for."""
+SURELY_MATTE = 2.0
+"""Where metal leaves more than this beside a matte surface, it is none."""
+ROWS = 4
+"""That are solved in one call."""
+
+
+def matte_plates(
+    plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, metal: Metal, solved: Surface, usable: Usable,
+    *, seen: Mask | None, mask: Mask | None,
+) -> list[Floats]:  # fmt: skip
+    """Return plates (row, col) or (row, col, channel) in which metal is replaced by what a matte surface with its
+    normals would show, and the rest is as it was. ``solved`` is what solving the plates as they are gave.
+
+    Clipped and dark samples stay as they are: they do not count."""
+    made = [np.array(rows_of(plate, np.arange(plate.shape[0])), np.float32) for plate in plates]
+    starts, numbers = directions(APART_DEG, FARTHEST_DEG), np.array(metal.shown)
+    dark = usable.dark_level * lit.noisiness
+
+    def change(first: int, last: int) -> None:
+        at = _asked(solved, mask, first, last)
+        if not len(at[0]):
+            return
+        normals = solved.normals[at].astype(np.float64)
+        points = points_at(made, lit, at, usable, normals, seen=seen, black_level=0.0, scale=1.0).in_order()
+        most = np.stack([plate[at] if plate.ndim == 2 else plate[at].max(axis=1) for plate in made])
+        factors = _factors(points, points.seen * (most > dark[:, None]), starts, numbers)
+        for plate, factor in zip(made, factors.astype(np.float32), strict=True):
+            plate[at] *= factor if plate.ndim == 2 else factor[:, None]
+
+    over_ranges(change, solved.valid.shape[0], each=ROWS)
+    return made
+
+
+def _asked(solved: Surface, mask: Mask | None, first: int, last: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of those pixels of some rows that have a normal."""
+    known = solved.normals[first:last].any(axis=-1)
+    rows, cols = np.nonzero(known if mask is None else known & mask[first:last])
+    return rows + first, cols
+
+
+def _factors(points: SubjectPoints, bright: Doubles, starts: Doubles, numbers: Doubles) -> Doubles:
+    """Return for every measurement (light, point) what a matte surface would show over what is there; 1 where it is not
+    ``bright`` (0 or 1), and in pixels that are no metal."""
+    from psvideo.solve.normals.metal import metal_kernel as kernel
+
+    ways = points.towards, points.half
+    normals, left = _as_metal(points, starts, numbers)
+    shown = np.empty_like(points.measured)
+    kernel.fill_matte(points.measured, bright, *ways, normals, numbers, shown)
+    wanted = (left <= MOST_LEFT) & (bright > 0) & (points.measured > 0)
+    return np.asarray(np.where(wanted, shown / np.maximum(points.measured, 1e-9), 1.0))
+
+
+def _as_metal(points: SubjectPoints, starts: Doubles, numbers: Doubles) -> tuple[Doubles, Doubles]:
+    """Return the normals of points as metal, and what metal leaves of them over what a matte surface does."""
+    from psvideo.solve.normals.metal import metal_kernel as kernel
+
+    ways = points.measured, points.seen, points.towards, points.half
+    normals, lambert = np.empty_like(points.normals), np.zeros_like(numbers)
+    lambert[0] = 1.0
+    matte, metal = np.empty(len(normals)), np.empty(len(normals))
+    kernel.find_normals(*ways, starts, numbers, normals)
+    for found, facing, one in ((matte, points.normals, lambert), (metal, normals, numbers)):
+        shown = np.empty_like(points.measured)
+        kernel.fill_sums(facing, points.towards, points.half, one, shown)
+        kernel.fill_unlike(points.measured, points.seen, shown, found)
+    return normals, metal / np.maximum(matte, 1e-9)
+
+
+def metal_doubt_deg(
+    plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, metal: Metal, solved: Surface, usable: Usable,
+    *, seen: Mask | None, step: int,
+) -> Floats:  # fmt: skip
+    """Return by how many degrees normals may be off because what metal shows is not known better, in every ``step``-th
+    row and column of the picture; 0 where there is no metal."""
+    rows, cols = (np.arange(0, size, step) for size in solved.valid.shape)
+    found = np.zeros((len(rows), len(cols)), np.float32)
+    starts = directions(APART_DEG, FARTHEST_DEG)
+    for n, row in enumerate(rows):
+        known = np.flatnonzero(solved.normals[row, cols].any(axis=-1))
+        if len(known):
+            at = (np.full(len(known), row), cols[known])
+            normals = solved.normals[at].astype(np.float64)
+            points = points_at(plates, lit, at, usable, normals, seen=seen, black_level=0.0, scale=1.0).in_order()
+            found[n, known] = _doubt_deg(points, starts, metal)
+    return found
+
+
+def _doubt_deg(points: SubjectPoints, starts: Doubles, metal: Metal) -> Doubles:
+    """Return the same of points. Where metal explains about as much as a matte surface, either may be right."""
+    own, left = _as_metal(points, starts, np.array(metal.shown))
+    most = np.zeros(len(own))
+    for rival in metal.rivals:
+        most = np.maximum(most, _between_deg(own, _as_metal(points, starts, np.array(rival))[0]))
+    by_misfit = np.hypot(LEAST_DOUBT_DEG, MISFIT * np.degrees(np.sqrt(metal.unlike)))
+    most = np.where(left <= MOST_LEFT, np.hypot(most, by_misfit), 0.0)
+    either = (left > MOST_LEFT) & (left < SURELY_MATTE)
+    return np.asarray(np.where(either, _between_deg(own, points.normals), most))
+
+
+def _between_deg(some: Doubles, others: Doubles) -> Doubles:
+    """Return the angles between unit vectors (vector, 3)."""
+    return np.asarray(np.degrees(np.arccos(np.clip((some * others).sum(axis=1), -1, 1))))

@@ -1,0 +1,204 @@
+"""Whether a subject is metal, and what it then shows: lobes that explain its points far better than any matte surface.
+
+A point's normal under given lobes is looked for everywhere, not only around the one that a matte surface would have;
+lobes are fitted to the points' normals, and both in turn. Lobes h^2 to h^256 in sums follow microfacets of any
+roughness (B. Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007) closely enough.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import nnls  # type: ignore[attr-defined]  # its stubs leave it out
+
+from psvideo.compute.ranks import median
+from psvideo.model.arrays import Doubles
+from psvideo.model.surface import Metal
+from psvideo.solve.normals.robust.reflectance_fit import (
+    LEAST_POINTS,
+    SubjectPoints,
+    alternated,
+    joined,
+    parts_of,
+    sizes_of,
+)
+
+LIGHTS_FOR_METAL = 8
+"""Fewer explain every surface too well: photographs of pottery under six lights as well as metal's."""
+LEAST_UNLIKE = 2.5e-4
+"""What a matte surface with highlights leaves, as a share of the light's square roots, below which nobody asks."""
+MOST_LEFT = 0.35
+"""Of what that leaves, metal leaves at most this: of bronze, brushed and rough metal 0.02 to 0.35, of photographed
+pottery 0.5 to 1."""
+LEAST_TURNED_DEG = 2.0
+"""By so much lobes turn typical normals: for less nothing is to be gained."""
+PART_SURELY = 2.0
+"""What fits a matte surface worst fits anything else better by chance: of it so many times more is asked."""
+POINTS, FEWEST, MEASUREMENTS = 200, 100, 8000
+"""Lobes are fitted to so many points, to fewer under many lights."""
+TRIED, ALTERNATIONS, REWEIGHTED = 2, 7, 4
+"""Lobes and normals follow each other so often from every first guess, and from the best one; steps of weights."""
+APART_DEG, FARTHEST_DEG = 7.0, 85.0
+"""Between the normals that are tried, and how far they lean from the camera's axis."""
+WIDTH = 2.5
+FIRST_LOBES = (3, 4, 10)
+"""Which lobes are tried first, beside those that fit the matte surface's normals: h^8, h^16, and h^4 times n . l."""
+HOPELESS = 2.0
+"""What is so many times above MOST_LEFT then is not followed further."""
+
+
+Columns = tuple[int, ...]
+ALL, PLAIN, SHADED = tuple(range(17)), tuple(range(9)), (0, *range(9, 17))
+"""Which of a metal's numbers are fitted: all, and those of one kind of lobes."""
+
+
+class LobesAndNormals(NamedTuple):
+    """Lobes' numbers, the normals that follow them, and what they leave of every point."""
+
+    numbers: Doubles
+    normals: Doubles
+    unlike: Doubles
+
+
+def metal_of(looks: Sequence[SubjectPoints]) -> Metal | None:
+    """Return what a subject shows as metal, from one look at it or several; None where it is none. Where all points
+    show none, the half of them that fits a matte surface worst is asked: machines have painted parts, too."""
+    if not looks:
+        return None
+    points = _fewer(joined(looks))
+    if len(points.measured) < LIGHTS_FOR_METAL or points.measured.shape[1] < LEAST_POINTS:
+        return None
+    matte = _matte(points)
+    found = _metal(points, matte)
+    if found is not None:
+        return found
+    worse = matte.unlike > median(matte.unlike)
+    part = LobesAndNormals(matte.numbers, np.ascontiguousarray(matte.normals[worse]), matte.unlike[worse])
+    return _metal(points.only(worse), part, surely=PART_SURELY)
+
+
+def _metal(points: SubjectPoints, matte: LobesAndNormals, *, surely: float = 1.0) -> Metal | None:
+    """Return what points show as metal, where that explains them far better than a ``matte`` surface; so many times
+    more ``surely`` than for a whole subject."""
+    if median(matte.unlike) < LEAST_UNLIKE * surely:
+        return None
+    best = _best(points, matte, ALL)
+    if best is None:
+        return None
+    turned = np.degrees(np.arccos(np.clip((best.normals * matte.normals).sum(axis=1), -1, 1)))
+    if median(best.unlike) > MOST_LEFT / surely * median(matte.unlike) or median(turned) < LEAST_TURNED_DEG * surely:
+        return None
+    rivals = [_best(points, matte, columns) for columns in (PLAIN, SHADED)]
+    return Metal(
+        tuple(map(float, best.numbers)),
+        tuple(tuple(map(float, one.numbers)) for one in rivals if one is not None),
+        float(median(best.unlike)),
+    )
+
+
+def directions(apart_deg: float, farthest_deg: float) -> Doubles:
+    """Return unit vectors evenly over a cap around the camera's axis, (vector, 3).
+
+    >>> directions(30.0, 60.0).shape
+    (17, 3)
+    """
+    found = list[tuple[float, float, float]]()
+    for slant in np.radians(np.arange(0, farthest_deg + 1e-6, apart_deg)):
+        many = max(round(2 * np.pi * np.sin(slant) / np.radians(apart_deg)), 1)
+        for turn in np.arange(many) * 2 * np.pi / many:
+            found.append((np.sin(slant) * np.cos(turn), np.sin(slant) * np.sin(turn), np.cos(slant)))
+    return np.array(found)
+
+
+def _fewer(points: SubjectPoints) -> SubjectPoints:
+    """Return some of the points, evenly. In them every measurement counts that is not clipped: metal is dark where it
+    mirrors no light, and that says where it faces."""
+    lit = points.measured.max(axis=0) > 0
+    where, many = np.flatnonzero(lit), max(min(POINTS, MEASUREMENTS // len(points.measured)), FEWEST)
+    chosen = np.zeros(len(lit), bool)
+    chosen[where[np.unique(np.linspace(0, len(where) - 1, many).astype(np.intp))] if len(where) else where] = True
+    return points.only(chosen)
+
+
+def _matte(points: SubjectPoints) -> LobesAndNormals:
+    """Return what is left of the normals that a surface would have that is not metal: the least of lobes under the
+    normals as they were solved, of lobes under those that a matte surface's highlights turn them to, and of these
+    highlights themselves, which every paint has alike."""
+    sizes = sizes_of(points)
+    typical = median(sizes[sizes > 0])
+    shining = alternated(points, points.normals * np.maximum(sizes, 1e-3 * typical)[:, None], typical)
+    turned = shining.g / np.linalg.norm(shining.g, axis=1, keepdims=True)
+    kinds = [_fitted(points, one) for one in (points.normals, turned)]
+    shown = (points.towards * turned).sum(axis=-1) + np.tensordot(
+        shining.model, parts_of(points, shining.g, typical)[1:], axes=1
+    )
+    kinds.append(LobesAndNormals(kinds[1].numbers, np.ascontiguousarray(turned), _unlike(points, shown)))
+    return min(kinds, key=lambda one: median(one.unlike))
+
+
+def _unlike(points: SubjectPoints, shown: Doubles) -> Doubles:
+    """Return the share of every point's light that is not what is ``shown`` (light, point)."""
+    from psvideo.solve.normals.metal.metal_kernel import fill_unlike
+
+    unlike = np.empty(shown.shape[1])
+    fill_unlike(points.measured, points.seen, np.ascontiguousarray(shown), unlike)
+    return unlike
+
+
+def _best(points: SubjectPoints, matte: LobesAndNormals, columns: Columns) -> LobesAndNormals | None:
+    """Return the lobes, of some columns, that explain points best; None where they hardly explain them better."""
+    starts = directions(APART_DEG, FARTHEST_DEG)
+    tried = [_followed(points, first, starts, columns, times=TRIED) for first in _firsts(matte)]
+    best = min(tried, key=lambda one: median(one.unlike))
+    if median(best.unlike) > HOPELESS * MOST_LEFT * median(matte.unlike):
+        return None
+    return _followed(points, best.numbers, starts, columns, times=ALTERNATIONS)
+
+
+def _firsts(matte: LobesAndNormals) -> list[Doubles]:
+    """Return the lobes that are tried first."""
+    own = [matte.numbers]
+    for lobe in FIRST_LOBES:
+        one = np.zeros(len(matte.numbers))
+        one[0], one[lobe] = 0.2, 0.8
+        own.append(one)
+    return own
+
+
+def _followed(
+    points: SubjectPoints, first: Doubles, starts: Doubles, columns: Columns, *, times: int
+) -> LobesAndNormals:
+    """Return lobes and normals that follow each other from a first guess."""
+    from psvideo.solve.normals.metal.metal_kernel import find_normals
+
+    numbers, found = first, LobesAndNormals(first, points.normals, np.ones(len(points.normals)))
+    for _ in range(times):
+        normals = np.empty_like(points.normals)
+        find_normals(points.measured, points.seen, points.towards, points.half, starts, numbers, normals)
+        found = _fitted(points, normals, columns)
+        numbers = found.numbers
+    return found
+
+
+def _fitted(points: SubjectPoints, normals: Doubles, columns: Columns = ALL) -> LobesAndNormals:
+    """Return the lobes that explain points with these normals best, each point in a scale of its own."""
+    from psvideo.solve.normals.metal.metal_kernel import LOBES, fill_shown
+
+    parts = np.empty((1 + 2 * LOBES, *points.measured.shape))
+    fill_shown(np.ascontiguousarray(normals), points.towards, points.half, parts)
+    bright = np.maximum(points.measured, 0.0)
+    per = points.seen / (np.sqrt(bright) + 0.1 * np.sqrt(bright.max(axis=0)) + 1e-6)
+    numbers = np.full(1 + 2 * LOBES, 1 / (1 + 2 * LOBES))
+    for _ in range(REWEIGHTED):
+        shown = per * np.tensordot(numbers, parts, axes=1)
+        scale = (shown * per * bright).sum(axis=0) / np.maximum((shown**2).sum(axis=0), 1e-12)
+        rest = per * bright - scale * shown
+        spread = WIDTH * 1.48 * median(np.abs(rest[points.seen > 0])) + 1e-9
+        root = per / np.sqrt(1 + (rest / spread) ** 2)
+        wanted = (root * scale * parts[list(columns)]).reshape(len(columns), -1).T
+        numbers = np.zeros(1 + 2 * LOBES)
+        numbers[list(columns)] = nnls(wanted, (root * bright).ravel())[0]
+        numbers /= max(float(numbers.sum()), 1e-9)
+    return LobesAndNormals(
+        numbers, np.ascontiguousarray(normals), _unlike(points, np.tensordot(numbers, parts, axes=1))
+    )
