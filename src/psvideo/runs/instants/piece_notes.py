@@ -32,7 +32,6 @@ BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
 CLOSE_LOOKS = TypeAdapter(CloseLooks)
-METAL = TypeAdapter(Metal)
 
 
 def write_notes(folder: Path, numbers: range, found: Found) -> None:
@@ -100,10 +99,14 @@ def noted_subject(folder: Path) -> Subject | None:
         known, metal = record["reflectance"], record["metal"]
         return Subject(
             reflectance=None if known is None else Reflectance(*map(float, known)),
-            metal=None if metal is None else METAL.validate_python(metal),
+            metal=None if metal is None else _metal(*metal),
         )
-    except (OSError, ValueError, KeyError, TypeError, ValidationError) as fault:
+    except (OSError, ValueError, KeyError, TypeError) as fault:
         raise PsvideoError(f"{path}: cannot be read ({fault}). {_ADVICE}") from fault
+
+
+def _metal(shown: list[float], rivals: list[list[float]], unlike: float) -> Metal:
+    return Metal(tuple(map(float, shown)), tuple(tuple(map(float, one)) for one in rivals), float(unlike))
 
 
 def noted(folder: Path) -> Iterator[tuple[range, Found]]:
