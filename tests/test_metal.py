@@ -113,6 +113,15 @@ def test_metal_is_solved_by_its_highlights(
     assert (off[as_metal.valid] > 10).mean() < 0.03
 
 
+@pytest.mark.parametrize("kind", ["microfacets", "ward"])
+def test_albedo_of_metal_is_that_of_what_faces_the_camera(kind: Kind) -> None:
+    """What leans is dark under lamps that it does not mirror, and no darker metal for that."""
+    truth = bumps()
+    albedo = solved(shot(truth, TWELVE, BRONZE, kind), TWELVE).albedo.reshape(SIZE, SIZE)
+    lean, straight = (np.median(albedo[some]) for some in (truth[..., 2] < 0.65, truth[..., 2] > 0.9))
+    assert 1 / 1.6 < lean / straight < 1.6
+
+
 @pytest.mark.parametrize("material", [MATTE, VARNISH, (0.5, 0.05, 0.45)])
 @pytest.mark.parametrize("lights", [EIGHT, TWELVE])
 def test_what_is_matte_or_varnished_is_no_metal(material: tuple[float, float, float], lights: Array) -> None:
@@ -132,6 +141,24 @@ def test_lights_that_are_off_make_nothing_metal() -> None:
         off /= np.linalg.norm(off, axis=1, keepdims=True)
         for material in (MATTE, VARNISH):
             assert found_in(shot(bumps(), TWELVE, material), off) is None
+
+
+WIDE = np.concatenate([ring(6, 65), ring(4, 35)])
+
+
+@pytest.mark.parametrize("lights", [TWELVE, WIDE])
+def test_what_is_soft_or_lit_from_around_is_no_metal(lights: Array) -> None:
+    truth, rng = bumps(), np.random.default_rng(3)
+    cosines = np.stack([truth @ light for light in lights])
+    wax = 0.5 * np.maximum((cosines + 0.35) / 1.35, 0)
+    room = 0.5 * np.maximum(cosines, 0) + 0.03
+    for shown in (wax, room):
+        assert found_in(np.maximum(shown + rng.normal(0, 0.003, shown.shape), 0), lights) is None
+
+
+def test_lights_on_a_ring_are_not_asked() -> None:
+    """They mirror in as many places on either side of one circle: a ball lit from around came out 47 degrees off."""
+    assert found_in(shot(bumps(), ring(8, 50), BRONZE), ring(8, 50)) is None
 
 
 def test_fewer_lights_are_not_asked() -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from psvideo.model.rig import Light, Rig
 
 RING = [(0.5, 0.0), (-0.5, 0.1), (0.1, 0.5), (-0.1, -0.5), (0.4, 0.4), (-0.4, 0.4), (-0.4, -0.4), (0.4, -0.4)]
-"""The lights' x and y; z is 0.8."""
+"""The lights' x and y; z is 0.8, of metal in turn 1.6."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,8 @@ class SmallPictures:
     @property
     def directions(self) -> NDArray[np.float64]:
         """Unit vectors (light, 3)."""
-        ways = np.array([(x, y, 0.8) for x, y in RING[: self.lights]])
+        deep = (0.8, 1.6) if self.metal else (0.8, 0.8)  # on a ring nobody asks for metal
+        ways = np.array([(x, y, deep[n % 2]) for n, (x, y) in enumerate(RING[: self.lights])])
         return np.asarray(ways / np.linalg.norm(ways, axis=1, keepdims=True))
 
     @property

@@ -22,6 +22,9 @@ MISFIT = 2.5
 """A normal may be turned by so many times the angle that lobes leave of a typical pixel's light."""
 LEAST_DOUBT_DEG = 2.0
 """Where lobes of either kind agree and leave next to nothing, normals are still so far off."""
+USUAL, MOST_DEG, TINY_DEG = 0.8, 20.0, 1e-6
+"""Where kinds of lobes happen to agree, normals are doubted by this much of what they differ by all over the subject,
+root mean square: what lobes are not known to be is wrong everywhere. No pixel counts for more than MOST_DEG there."""
 APART_DEG = 10.0
 """Between the normals from which each pixel's is looked for."""
 SURELY_MATTE = 2.0
@@ -100,7 +103,7 @@ def metal_doubt_deg(
     """Return by how many degrees normals may be off because what metal shows is not known better, in every ``step``-th
     row and column of the picture; 0 where there is no metal."""
     rows, cols = (np.arange(0, size, step) for size in solved.valid.shape)
-    found = np.zeros((len(rows), len(cols)), np.float32)
+    found = np.zeros((2, len(rows), len(cols)))
     starts = directions(APART_DEG, FARTHEST_DEG)
     for n, row in enumerate(rows):
         known = np.flatnonzero(solved.normals[row, cols].any(axis=-1))
@@ -108,20 +111,24 @@ def metal_doubt_deg(
             at = (np.full(len(known), row), cols[known])
             normals = solved.normals[at].astype(np.float64)
             points = points_at(plates, lit, at, usable, normals, seen=seen, black_level=0.0, scale=1.0).in_order()
-            found[n, known] = _doubt_deg(points, starts, metal)
-    return found
+            found[:, n, known] = _rivals_and_either_deg(points, starts, metal)
+    by_rivals, either = found
+    is_metal = by_rivals > 0
+    usual = np.sqrt(np.mean(np.minimum(by_rivals[is_metal], MOST_DEG) ** 2)) if is_metal.any() else 0.0
+    by_misfit = np.hypot(LEAST_DOUBT_DEG, MISFIT * np.degrees(np.sqrt(metal.unlike)))
+    own = np.where(is_metal, np.hypot(np.maximum(by_rivals, USUAL * usual), by_misfit), either)
+    return np.asarray(own, np.float32)
 
 
-def _doubt_deg(points: SubjectPoints, starts: Doubles, metal: Metal) -> Doubles:
-    """Return the same of points. Where metal explains about as much as a matte surface, either may be right."""
+def _rivals_and_either_deg(points: SubjectPoints, starts: Doubles, metal: Metal) -> tuple[Doubles, Doubles]:
+    """Return of points how far normals under one kind of lobes are from those under all, above 0, where they are metal;
+    and the angle between the two where metal explains about as much as a matte surface."""
     own, left = _as_metal(points, starts, np.array(metal.shown))
-    most = np.zeros(len(own))
+    most = np.full(len(own), TINY_DEG)
     for rival in metal.rivals:
         most = np.maximum(most, _between_deg(own, _as_metal(points, starts, np.array(rival))[0]))
-    by_misfit = np.hypot(LEAST_DOUBT_DEG, MISFIT * np.degrees(np.sqrt(metal.unlike)))
-    most = np.where(left <= MOST_LEFT, np.hypot(most, by_misfit), 0.0)
     either = (left > MOST_LEFT) & (left < SURELY_MATTE)
-    return np.asarray(np.where(either, _between_deg(own, points.normals), most))
+    return np.where(left <= MOST_LEFT, most, 0.0), np.where(either, _between_deg(own, points.normals), 0.0)
 
 
 def _between_deg(some: Doubles, others: Doubles) -> Doubles:

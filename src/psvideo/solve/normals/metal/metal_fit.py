@@ -16,9 +16,13 @@ from psvideo.model.arrays import Doubles
 from psvideo.model.surface import Metal
 from psvideo.solve.normals.robust.reflectance_fit import (
     LEAST_POINTS,
+    ON_A_RING,
+    Kind,
+    Sought,
     SubjectPoints,
     alternated,
     joined,
+    off_a_ring,
     parts_of,
     sizes_of,
 )
@@ -43,6 +47,8 @@ APART_DEG, FARTHEST_DEG = 7.0, 85.0
 WIDTH = 2.5
 FIRST_LOBES = (3, 4, 10)
 """Which lobes are tried first, beside those that fit the matte surface's normals: h^8, h^16, and h^4 times n . l."""
+NOT_METAL: tuple[Kind, ...] = ("shining", "rough", "soft")
+"""What a subject is asked for beside metal."""
 HOPELESS = 2.0
 """What is so many times above MOST_LEFT then is not followed further."""
 
@@ -67,6 +73,8 @@ def metal_of(looks: Sequence[SubjectPoints]) -> Metal | None:
         return None
     points = _fewer(joined(looks))
     if len(points.measured) < LIGHTS_FOR_METAL or points.measured.shape[1] < LEAST_POINTS:
+        return None
+    if off_a_ring(points.towards.mean(axis=1)) < ON_A_RING:
         return None
     matte = _matte(points)
     found = _metal(points, matte)
@@ -121,18 +129,20 @@ def _fewer(points: SubjectPoints) -> SubjectPoints:
 
 
 def _matte(points: SubjectPoints) -> LobesAndNormals:
-    """Return what is left of the normals that a surface would have that is not metal: the least of lobes under the
-    normals as they were solved, of lobes under those that a matte surface's highlights turn them to, and of these
-    highlights themselves, which every paint has alike."""
+    """Return what is left of the normals that a surface would have that is not metal: the least of lobes and light from
+    around under the normals as they were solved, of the same under those that a shining, rough or soft subject turns
+    them to, and of what such a subject shows itself."""
     sizes = sizes_of(points)
     typical = median(sizes[sizes > 0])
-    shining = alternated(points, points.normals * np.maximum(sizes, 1e-3 * typical)[:, None], typical)
-    turned = shining.g / np.linalg.norm(shining.g, axis=1, keepdims=True)
-    kinds = [_fitted(points, one) for one in (points.normals, turned)]
-    shown = (points.towards * turned).sum(axis=-1) + np.tensordot(
-        shining.model, parts_of(points, shining.g, typical)[1:], axes=1
-    )
-    kinds.append(LobesAndNormals(kinds[1].numbers, np.ascontiguousarray(turned), _unlike(points, shown)))
+    g = points.normals * np.maximum(sizes, 1e-3 * typical)[:, None]
+    kinds = [_fitted(points, points.normals, lit_from_around=True)]
+    for kind in NOT_METAL:
+        found = alternated(points, g, typical, Sought(kind))
+        turned = np.ascontiguousarray(found.g / np.linalg.norm(found.g, axis=1, keepdims=True))
+        lobes = _fitted(points, turned, lit_from_around=True)
+        cosines = (points.towards * turned).sum(axis=-1)
+        shown = cosines + np.tensordot(found.model, parts_of(points, found.g, typical)[1:], axes=1)
+        kinds += [lobes, LobesAndNormals(lobes.numbers, turned, _unlike(points, shown))]
     return min(kinds, key=lambda one: median(one.unlike))
 
 
@@ -180,15 +190,21 @@ def _followed(
     return found
 
 
-def _fitted(points: SubjectPoints, normals: Doubles, columns: Columns = ALL) -> LobesAndNormals:
-    """Return the lobes that explain points with these normals best, each point in a scale of its own."""
+def _fitted(
+    points: SubjectPoints, normals: Doubles, columns: Columns = ALL, *, lit_from_around: bool = False
+) -> LobesAndNormals:
+    """Return the lobes that explain points with these normals best, each point in a scale of its own; and where
+    ``lit_from_around``, light of every lamp that reaches all points alike, shadows as well."""
     from psvideo.solve.normals.metal.metal_kernel import LOBES, fill_shown
 
     parts = np.empty((1 + 2 * LOBES, *points.measured.shape))
     fill_shown(np.ascontiguousarray(normals), points.towards, points.half, parts)
+    if lit_from_around:
+        parts = np.concatenate([parts, np.ones_like(parts[:1])])
+        columns = (*columns, len(parts) - 1)
     bright = np.maximum(points.measured, 0.0)
     per = points.seen / (np.sqrt(bright) + 0.1 * np.sqrt(bright.max(axis=0)) + 1e-6)
-    numbers = np.full(1 + 2 * LOBES, 1 / (1 + 2 * LOBES))
+    numbers = np.full(len(parts), 1 / len(parts))
     for _ in range(REWEIGHTED):
         shown = per * np.tensordot(numbers, parts, axes=1)
         scale = (shown * per * bright).sum(axis=0) / np.maximum((shown**2).sum(axis=0), 1e-12)
@@ -196,9 +212,8 @@ def _fitted(points: SubjectPoints, normals: Doubles, columns: Columns = ALL) -> 
         spread = WIDTH * 1.48 * median(np.abs(rest[points.seen > 0])) + 1e-9
         root = per / np.sqrt(1 + (rest / spread) ** 2)
         wanted = (root * scale * parts[list(columns)]).reshape(len(columns), -1).T
-        numbers = np.zeros(1 + 2 * LOBES)
+        numbers = np.zeros(len(parts))
         numbers[list(columns)] = nnls(wanted, (root * bright).ravel())[0]
         numbers /= max(float(numbers.sum()), 1e-9)
-    return LobesAndNormals(
-        numbers, np.ascontiguousarray(normals), _unlike(points, np.tensordot(numbers, parts, axes=1))
-    )
+    unlike = _unlike(points, np.tensordot(numbers, parts, axes=1))
+    return LobesAndNormals(numbers[: 1 + 2 * LOBES], np.ascontiguousarray(normals), unlike)

@@ -258,7 +258,8 @@ def fill_matte(
     measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, normals: Doubles, numbers: Doubles,
     matte: Doubles,
 ) -> None:  # fmt: skip
-    """Fill ``matte`` (light, point) with what matte points with these normals would show.
+    """Fill ``matte`` (light, point) with what matte points with these normals would show, as bright as the metal would
+    be if it faced the camera.
 
     What the metal leaves unexplained stays as much of a turn of the normal as it was; least squares finds the normal
     again, for what would turn it is taken off, and the rest is enlarged as if it were still there.
@@ -267,7 +268,7 @@ def fill_matte(
     cosines, left, m, own = np.empty(lights), np.empty(lights), np.empty(6), np.empty(3)
     for p in range(len(normals)):
         x, y, z = normals[p, 0], normals[p, 1], normals[p, 2]
-        along, square, bright, faced, many = 0.0, TINY, 0.0, TINY, 0.0
+        along, square, straight, faced, many = 0.0, TINY, 0.0, TINY, 0.0
         for light in range(lights):
             c, h = 0.0, 0.0
             for i in range(3):
@@ -277,10 +278,11 @@ def fill_matte(
             cosines[light] = max(c, 0.0)
             along += counts[light, p] * np.sqrt(shown * max(measured[light, p], 0.0))
             square += counts[light, p] * shown
-            bright += counts[light, p] * max(measured[light, p], 0.0)
-            faced += counts[light, p] * cosines[light]
+            straight += _shown(numbers, towards[light, p, 2], half[light, p, 2])[0]
+            faced += max(towards[light, p, 2], 0.0)
             many += counts[light, p] if c > 0.0 else 0.0
-        scale, size = (along / square) ** 2, bright / faced
+        scale = (along / square) ** 2
+        size = scale * straight / faced
         m[:], own[:] = 0.0, 0.0
         m[0] = m[3] = m[5] = 1e-9
         for light in range(lights):
