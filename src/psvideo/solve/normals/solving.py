@@ -144,7 +144,8 @@ class Solving:
         solved, one, _ = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure)
         step = one.step_of(solved.valid.shape)
         doubt = metal_doubt_deg(plates, lit, metal, solved, one.usable, seen=seen, step=step)
-        return matte_plates(plates, lit, metal, solved, one.usable, seen=seen, mask=mask), doubt
+        made = matte_plates(plates, lit, metal, solved, one.usable, seen=seen, mask=mask, spare=self.spare)
+        return made, doubt
 
     def look(
         self,

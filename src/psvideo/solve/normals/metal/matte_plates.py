@@ -1,10 +1,13 @@
 """Plates of metal, as a matte surface with the same normals would show them."""
 
 from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go, planes_for
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.surface import Metal, Surface
@@ -29,24 +32,26 @@ APART_DEG = 10.0
 """Between the normals from which each pixel's is looked for."""
 SURELY_MATTE = 2.0
 """Where metal leaves more than this beside a matte surface, it is none."""
-ROWS = 4
-"""That are solved in one call."""
+BAND, ROWS = 64, 4
+"""Rows that are read at a time, and of these solved in one call."""
 
 
 def matte_plates(
     plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, metal: Metal, solved: Surface, usable: Usable,
-    *, seen: Mask | None, mask: Mask | None,
+    *, seen: Mask | None, mask: Mask | None, spare: Path | None = None,
 ) -> list[Floats]:  # fmt: skip
     """Return plates (row, col) or (row, col, channel) in which metal is replaced by what a matte surface with its
-    normals would show, and the rest is as it was. ``solved`` is what solving the plates as they are gave.
+    normals would show, and the rest is as it was. ``solved`` is what solving the plates as they are gave; large ones
+    lie in files of the folder ``spare``.
 
     Clipped and dark samples stay as they are: they do not count."""
-    made = [np.array(rows_of(plate, np.arange(plate.shape[0])), np.float32) for plate in plates]
+    count, pixels = solved.valid.shape[0], solved.valid.size
+    made = [planes_for(plate.shape, np.float32, pixels=pixels, folder=spare) for plate in plates]
     starts, numbers = directions(APART_DEG, FARTHEST_DEG), np.array(metal.shown)
     dark = usable.dark_level * lit.noisiness
 
-    def change(first: int, last: int) -> None:
-        at = _asked(solved, mask, first, last)
+    def change(top: int, first: int, last: int) -> None:
+        at = _asked(solved, mask, top + first, top + last)
         if not len(at[0]):
             return
         normals = solved.normals[at].astype(np.float64)
@@ -56,7 +61,12 @@ def matte_plates(
         for plate, factor in zip(made, factors.astype(np.float32), strict=True):
             plate[at] *= factor if plate.ndim == 2 else factor[:, None]
 
-    over_ranges(change, solved.valid.shape[0], each=ROWS)
+    for top in range(0, count, BAND):
+        end = min(top + BAND, count)
+        for number, new in enumerate(made):
+            new[top:end] = rows_of(plates[number], np.arange(top, end))
+        over_ranges(partial(change, top), end - top, each=ROWS)
+        let_go(*(new[top:end] for new in made))
     return made
 
 
