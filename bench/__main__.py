@@ -31,6 +31,7 @@ TABLES = (
     "accuracy",
     "predicted",
     "few_lights",
+    "metal",
     "verdicts",
     "verdict_rigs",
 )

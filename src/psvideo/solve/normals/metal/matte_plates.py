@@ -21,7 +21,7 @@ from psvideo.solve.normals.task import Samples, Usable
 
 MOST_LEFT = 0.5
 """A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""
-MISFIT = 2.5
+MISFIT = 4.0
 """A normal may be turned by so many times the angle that lobes leave of a typical pixel's light."""
 LEAST_DOUBT_DEG = 2.0
 """Where lobes of either kind agree and leave next to nothing, normals are still so far off."""
