@@ -12,7 +12,6 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
 from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, slope_agreement, surface_agreement
-from psvideo.report.observe.rig_and_curve.yuille1997 import lean
 from psvideo.solve.depth.view import View
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
@@ -428,13 +427,6 @@ def test_a_sheet_of_paper_before_a_wall_says_nothing_of_the_rig_for_its_edges_en
     for lean_x, lean_y in ((0.4, 0.3), (0.4, -0.3), (0.2, 0.5), (-0.3, 0.1)):
         agreement = slope_agreement(coarse_normals(sheet(lean_x=lean_x, lean_y=lean_y, raised=True)))
         assert agreement is None or agreement > 0.3
-
-
-@pytest.mark.parametrize("slopes", [(0.4, 0.3), (0.4, -0.3), (0.2, 0.5), (-0.3, 0.1)])
-def test_the_edges_of_a_sheet_of_paper_make_no_rig_lean(slopes: tuple[float, float]) -> None:
-    """They end it before the wall, and belong to neither: taken for a surface's, its normals leaned by 88 degrees."""
-    found = lean(coarse_normals(sheet(lean_x=slopes[0], lean_y=slopes[1], raised=True)))
-    assert found is None or found.lean_deg < 6
 
 
 def test_a_crease_of_one_surface_and_what_is_curved_beside_a_sheet_of_paper_speak() -> None:

@@ -30,9 +30,11 @@ def smooth_slopes(
 
 
 def _changes(valid: NDArray[np.bool_], normals: NDArray[np.float32], blur_px: float) -> NDArray[np.float32]:
-    """Return the sum of squares by which slopes change per pixel."""
+    """Return the sum of squares by which slopes change per pixel; of a single row or column 0."""
     slope_x, slope_y, _ = smooth_slopes(valid, normals, blur_px)
     total = np.zeros_like(slope_x)
+    if min(total.shape) < 2:
+        return total
     for slope in (slope_x, slope_y):
         for way in np.gradient(slope):
             total += way * way

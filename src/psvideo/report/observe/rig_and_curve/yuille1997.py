@@ -16,7 +16,6 @@ import numpy as np
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles
 from psvideo.model.rig import Rig
-from psvideo.report.observe.rig_and_curve.edges_of_slopes import on_edges
 from psvideo.report.observe.rig_and_curve.slopes import (
     BLUR_PX,
     LEAST_PIXELS,
@@ -170,8 +169,7 @@ def _bending(seen: Averaged) -> _Bending:
     around = np.ones((BESIDE_PX, BESIDE_PX), np.uint8)
     whole = cv2.erode((valid & (planes[2] > FACING)).astype(np.uint8), around, borderValue=0) > 0
     torn = cv2.dilate((whole & (bend > CREASE**2)).astype(np.uint8), around) > 0
-    edges = on_edges(valid, small, BLUR_PX)  # of flat faces: those that end one thing before another are no surface's
-    down, across = np.nonzero(whole & ~torn & ~edges & (bend > CLEAR * noise))
+    down, across = np.nonzero(whole & ~torn & (bend > CLEAR * noise))
     each = -(-max(len(down), 1) // MOST_POINTS)
     down, across = down[::each], across[::each]
     rows, cols = valid.shape
