@@ -9,6 +9,7 @@ import numpy as np
 
 from psvideo.compute.compiled import EXACT, FUSED
 from psvideo.model.arrays import Doubles
+from psvideo.solve.normals.robust.reflectance_kernel import solve_symmetric
 
 LOBES = 8
 """Of h^2, h^4 and so on, each the square of the one before."""
@@ -239,20 +240,6 @@ def fill_unlike(measured: Doubles, counts: Doubles, shown: Doubles, unlike: Doub
         unlike[p] = total / there
 
 
-@FUSED.inlined
-def _solve_symmetric(m: Doubles, x: Doubles) -> None:
-    """Solve with a positive definite matrix (its upper triangle row by row); the answer stands in ``x``."""
-    b, c = m[1] / m[0], m[2] / m[0]
-    d = m[3] - b * m[1]
-    t = m[4] - c * m[1]
-    e = t / d
-    f = m[5] - c * m[2] - e * t
-    y = x[1] - b * x[0]
-    x[2] = (x[2] - c * x[0] - e * y) / f
-    x[1] = y / d - e * x[2]
-    x[0] = x[0] / m[0] - b * x[1] - c * x[2]
-
-
 @FUSED.kept
 def fill_matte(
     measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, normals: Doubles, numbers: Doubles,
@@ -309,7 +296,7 @@ def fill_matte(
             own[0] += left[light] * lx
             own[1] += left[light] * ly
             own[2] += left[light] * lz
-        _solve_symmetric(m, own)
+        solve_symmetric(m, own)
         more = np.sqrt(many / max(many - 3.0, 1.0))
         for light in range(lights):
             matte[light, p] = max(measured[light, p], 0.0)

@@ -120,7 +120,7 @@ def _add_square(m: Doubles, weight: float, x: float, y: float, z: float) -> None
 
 
 @FUSED.inlined
-def _solve_symmetric(m: Doubles, x: Doubles) -> None:
+def solve_symmetric(m: Doubles, x: Doubles) -> None:
     """Solve with a positive definite matrix (its upper triangle row by row); the answer stands in ``x``."""
     b, c = m[1] / m[0], m[2] / m[0]
     d = m[3] - b * m[1]
@@ -148,7 +148,7 @@ def take_off_own(towards: Doubles, weights: Doubles, parts: Doubles, left: Doubl
             for light in range(len(towards)):
                 for i in range(3):
                     own[i] += weights[light, p] * parts[k, light, p] * towards[light, p, i]
-            _solve_symmetric(matrix, own)
+            solve_symmetric(matrix, own)
             for light in range(len(towards)):
                 left[k, light, p] = parts[k, light, p] - _along(towards, light, p, own)
 
@@ -232,7 +232,7 @@ def solve_again(
                 right[i] += weight * matte[light] * rows[light, i]
         more = 1e-6 * (matrix[0] + matrix[3] + matrix[5]) + 1e-12
         matrix[0], matrix[3], matrix[5] = matrix[0] + more, matrix[3] + more, matrix[5] + more
-        _solve_symmetric(matrix, right)
+        solve_symmetric(matrix, right)
         far = np.sqrt((right[0] - g[p, 0]) ** 2 + (right[1] - g[p, 1]) ** 2 + (right[2] - g[p, 2]) ** 2)
         share = min(1.0, LONGEST_STEP * size / max(far, 1e-12))
         for i in range(3):
