@@ -182,6 +182,16 @@ def test_what_may_cost_accuracy_is_a_warning(shot: Path, plan: Plan, name: str) 
     assert message in lines(found, "warn")
 
 
+def test_a_white_level_of_other_files_is_said_once_and_not_that_the_picture_may_be_very_dark_as_well(
+    shot: Path, plan: Plan
+) -> None:
+    put_frames(shot / "frames", range(1, 41), dtype=np.uint8)
+    put_plan(shot, plan, white_level=65535)
+    told = lines(describe(shot), "warn")
+    assert "white_level is 65535 in the plan, and the largest code of these 8-bit files is 255" in told
+    assert "dark" not in told
+
+
 @pytest.mark.parametrize(
     ("frames", "level", "message"), [(8, "ok", "2 whole rounds"), (9, "warn", "1 frame "), (3, "FAULT", "1 are")]
 )

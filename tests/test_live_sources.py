@@ -280,6 +280,33 @@ def test_frames_that_a_recorder_writes_out_of_order_are_read_in_order_and_none_i
     assert found == list(range(12))
 
 
+def test_a_file_that_a_recorder_never_finishes_is_waited_for_and_named_and_the_frames_after_it_come(
+    clip: Path, tmp_path: Path
+) -> None:
+    files = sorted((clip / "frames").iterdir())[:8]
+    for place, file in enumerate(files):
+        data = file.read_bytes()
+        (tmp_path / file.name).write_bytes(data[: len(data) // 2] if place in (0, 3) else data)
+    said: list[str] = []
+    began_s = time.monotonic()
+    growing = read_growing(tmp_path, ps.open_take(clip).plan.camera, quiet_s=0.3, whole_s=0.2, noted=said.append)
+    found = [(frame.index, frame.number) for frame in growing]
+    assert found == [(0, 2), (1, 3), (3, 5), (4, 6), (5, 7), (6, 8)], "what is left out counts as a dropped frame"
+    assert time.monotonic() - began_s > 0.2 + 0.2 + 0.3, "each was waited for, and the end"
+    assert [files[place].name in sentence for place, sentence in zip((0, 3), said, strict=True)] == [True, True]
+
+
+@pytest.mark.parametrize("whole", [0, 2])
+def test_a_folder_in_which_no_file_gets_whole_is_refused_with_what_is_wrong(
+    clip: Path, tmp_path: Path, whole: int
+) -> None:
+    for place, file in enumerate(sorted((clip / "frames").iterdir())[: whole + (4 if whole else 1)]):
+        (tmp_path / file.name).write_bytes(file.read_bytes() if place < whole else b"")
+    growing = read_growing(tmp_path, ps.open_take(clip).plan.camera, quiet_s=0.2, whole_s=0.05)
+    with pytest.raises(ps.PsvideoError, match="is empty"):
+        list(growing)
+
+
 def test_frames_that_grow_are_called_by_their_files_numbers(clip: Path, tmp_path: Path) -> None:
     files = sorted((clip / "frames").iterdir())[:3]
     for number, file in zip((1001, 1002, 1004), files, strict=True):

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.clip.decode.decoders import read_header
+from psvideo.clip.linear import white_of_others
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import looks, read_frames
 from psvideo.clip.record import Clip
@@ -142,6 +143,8 @@ def _level_findings(clip: Clip) -> Iterator[Finding]:
         yield warn(f"{levels}: the plan's black_level or white_level does not fit the files' codes")
     elif saturated > SATURATED_SHARE:
         yield warn(f"{levels}: {saturated:.1%} of the pixels are saturated")
+    elif high < DIM and white_of_others(clip.header, clip.encoding):
+        return  # why all is dark is among the clip's warnings
     elif high < DIM:
         yield warn(f"{levels}: very dark, or white_level is not counted in the files' codes")
     else:

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from psvideo.clip.decode.decoders import opened
@@ -20,6 +20,8 @@ LOOK_S = 0.004
 """Between two looks into the folder."""
 WHOLE_S = 2.0
 """A file that cannot be decoded for this long is damaged, and not merely still being written."""
+MOST_DAMAGED = 3
+"""Where more files in a row stay unreadable, it is no accident: their kind, or their disk, cannot be read."""
 LOOKS = 0.25
 """Looking takes no more than this share of the time in which nothing new comes: folders hold tens of thousands."""
 LATE_S = 0.25
@@ -28,11 +30,20 @@ QUIET_S = 10.0
 """After this long without a new frame the recorder has ended."""
 
 
-def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> Iterator[Frame]:
+def read_growing(
+    folder: Path,
+    camera: Camera,
+    *,
+    quiet_s: float = QUIET_S,
+    whole_s: float = WHOLE_S,
+    noted: Callable[[str], None] = lambda note: None,
+) -> Iterator[Frame]:
     """Give the frames that appear in a folder or its ``frames/``, until none has for ``quiet_s``.
 
-    Numbers that are left out count as dropped frames, unless their files come a moment late. Raises PsvideoError where
-    the folder is not there, where frames are not the camera's, and where a file stays unreadable.
+    Numbers that are left out count as dropped frames, unless their files come a moment late. A file that cannot be
+    read is looked at again for ``whole_s``, as it may be half written; then it is left out, and ``noted`` gets a
+    sentence that names it. Raises PsvideoError where the folder is not there, where frames are not the camera's, and
+    where files one after the other, or all of them, stay unreadable.
     """
     if not folder.is_dir():
         raise PsvideoError(f"{folder}: there is no such folder. Name the one that the recorder writes into.")
@@ -40,6 +51,7 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
     passed: dict[Path, set[str]] = {}
     seen_s: dict[int, float] = {}
     heard_s = time.monotonic()
+    damaged: list[PsvideoError] = []
     while time.monotonic() - heard_s < quiet_s:
         looked_s = time.monotonic()
         new, before = _new_files(folder, done, passed), done
@@ -48,7 +60,16 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
         for number, file in new:
             if first is not None and number > done + 1 and time.monotonic() - seen_s[number] < LATE_S:
                 break  # the one before may still come
-            picture = _whole(file)
+            try:
+                picture = _whole(file, whole_s)
+            except PsvideoError as fault:
+                damaged.append(fault)
+                if len(damaged) > MOST_DAMAGED:
+                    raise
+                noted(f"{file}: could not be read for {whole_s:g} s, and was left out: a dropped frame.")
+                done = number
+                continue
+            damaged.clear()
             head = picture.header
             if (head.width_px, head.height_px) != (camera.width_px, camera.height_px) or look not in ("", looks(head)):
                 expected = look or f"{camera.width_px} x {camera.height_px} pixels"
@@ -58,12 +79,14 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
                 )
             check_live_filters(file, head, camera.encoding.cfa)
             first, look, done = number if first is None else first, looks(head), number
-            seen_s.pop(number)
             yield Frame(index=number - first, number=number, coded=in_codes(picture, camera.encoding))
         if done > before:
+            seen_s = {number: at_s for number, at_s in seen_s.items() if number > done}
             heard_s = time.monotonic()
         else:
             time.sleep(max(LOOK_S, took_s * (1 / LOOKS - 1)))
+    if first is None and damaged:
+        raise damaged[0]
     if first is None:
         raise PsvideoError(
             f"{folder}: no frame appeared in {quiet_s:g} s; expected numbered images ({', '.join(sorted(KINDS)[:6])}, "
@@ -98,13 +121,13 @@ def _image_number(file: Path) -> int | None:
     return number_of(file) if file.suffix.lower() in KINDS else None
 
 
-def _whole(file: Path) -> CodedPicture | PictureInFile:
-    """Decode a file, again and again while it is being written."""
+def _whole(file: Path, whole_s: float) -> CodedPicture | PictureInFile:
+    """Decode a file, again and again while it is being written. Raises PsvideoError where it cannot for ``whole_s``."""
     began_s = time.monotonic()
     while True:
         try:
             return opened(KINDS[file.suffix.lower()], file)
         except PsvideoError:
-            if time.monotonic() - began_s > WHOLE_S:
+            if time.monotonic() - began_s > whole_s:
                 raise
             time.sleep(LOOK_S)

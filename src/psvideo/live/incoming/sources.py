@@ -31,8 +31,11 @@ def opened_source(
     Raises UsageError where what is needed for it was not given.
     """
     if growing:
-        found = _live(source, plan, lambda one: read_growing(Path(source), one.camera), files=True)
-        return replace(found, check="that the recorder still writes its frames into this folder")
+        left_out: list[str] = []
+        found = _live(
+            source, plan, lambda one: read_growing(Path(source), one.camera, noted=left_out.append), files=True
+        )
+        return replace(found, notes=left_out, check="that the recorder still writes its frames into this folder")
     if is_genicam(source):
         notes: list[str] = []
         found = _live(source, plan, lambda camera_plan: read_genicam(source, camera_plan.camera, noted=notes.append))
