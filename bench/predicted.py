@@ -26,6 +26,7 @@ from bench.accuracy_measure import (
 from bench.accuracy_whole import bust
 from bench.table import table
 from psvideo.solve.normals.illumination import MAX_CONDITION, Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.judging import Judging, looked_at
@@ -191,7 +192,7 @@ def random_lights(directions: np.ndarray, count: int, rng: np.random.Generator, 
 
 
 def _looked(subject: str, case: Case, *, flat: bool) -> Seen:
-    surface, one, noise = Solving().measured(case.plates, case.lit, mask=case.mask)
+    surface, one, noise = Solving().measured(LitPlates(case.plates, case.lit, mask=case.mask))
     points, signs = looked_at(surface, one, noise)
     truth = case.truth[:: points.step, :: points.step]
     known = points.known & (np.linalg.norm(truth, axis=-1) > 0.5)

@@ -8,6 +8,7 @@ from bench.predicted import SIZE, shapes
 from ring_and_ball import ring
 
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.by_colour import paleness, spread_across_and_along
 from psvideo.solve.normals.trust.judging import looked_at
@@ -35,7 +36,7 @@ def shot(
 
 def shown_and_true_deg(case: Case, *, half: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Return by how many degrees normals are turned, as colour shows it, and as they are, of every one."""
-    solved, one, noise = Solving(error=True, half=half).measured(case.plates, case.lit, mask=case.mask)
+    solved, one, noise = Solving(error=True, half=half).measured(LitPlates(case.plates, case.lit, mask=case.mask))
     points, found = looked_at(solved, one, noise)
     assert points.step == 1
     known = solved.valid
@@ -96,7 +97,7 @@ def test_a_normal_where_lights_spread_little_across_is_no_better_than_what_is_ar
     """Where lights turn normals far, some end in the direction into which they are turned: these are not trusted."""
     ways = np.array([[0.1, 0.0, 1.0], [0.3, 0.1, 1.0], [-0.2, 0.25, 1.0]])
     case = shot(GREEN, ways=ways / np.linalg.norm(ways, axis=1, keepdims=True), shape=WAVES)
-    solved, one, noise = Solving(error=True).measured(case.plates, case.lit, mask=case.mask)
+    solved, one, noise = Solving(error=True).measured(LitPlates(case.plates, case.lit, mask=case.mask))
     points, _ = looked_at(solved, one, noise)
     inverse = np.linalg.inv(case.lit.directions)
     worst = np.linalg.eigh(inverse @ inverse.T)[1][:, -1]

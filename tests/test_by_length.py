@@ -8,6 +8,7 @@ from bench.predicted import SIZE, shapes
 from ring_and_ball import ring
 
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.by_length import by_length_deg
 from psvideo.solve.normals.trust.judging import looked_at
@@ -42,7 +43,7 @@ def spots() -> np.ndarray:
 
 
 def shown_deg(case: Case) -> np.ndarray:
-    solved, one, noise = Solving(error=True).measured(case.plates, case.lit, mask=case.mask)
+    solved, one, noise = Solving(error=True).measured(LitPlates(case.plates, case.lit, mask=case.mask))
     points, found = looked_at(solved, one, noise)
     assert points.step == 1
     return np.asarray(np.broadcast_to(np.float32(found.by_length_deg), solved.valid.shape))
@@ -75,7 +76,7 @@ def test_three_lights_which_explain_everything_show_nothing() -> None:
 def test_what_is_usual_around_counts_nothing() -> None:
     """All of a surface that varies alike is as good or bad as its surroundings say."""
     case = shot(WAVES, paint=0.2)
-    solved, one, noise = Solving(error=True).measured(case.plates, case.lit, mask=case.mask)
+    solved, one, noise = Solving(error=True).measured(LitPlates(case.plates, case.lit, mask=case.mask))
     points, _ = looked_at(solved, one, noise)
     alike = np.full(points.known.shape, 9, np.float32)
     assert np.mean(by_length_deg(points, alike, np.zeros_like(alike)) > 3) < 0.02

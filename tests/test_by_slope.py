@@ -11,6 +11,7 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import MEASURED
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.added_light import added_unseen
 from psvideo.solve.normals.trust.by_slope_kernel import SUMMED, fill_averaged, fill_in_light, fill_summed
@@ -61,7 +62,7 @@ def everywhere(c: np.ndarray, _: np.ndarray) -> np.ndarray:
 def shown_and_true_deg(case: Case) -> tuple[float, float]:
     """Return by how many degrees typical normals are turned, as albedo shows it, and as they are."""
     solving = Solving(error=True)
-    solved, one, noise = solving.measured(case.plates, case.lit, mask=case.mask)
+    solved, one, noise = solving.measured(LitPlates(case.plates, case.lit, mask=case.mask))
     points, found = looked_at(solved, one, noise)
     shown = np.broadcast_to(found.by_slope_deg, points.known.shape)[points.known]
     known = solved.valid
@@ -342,7 +343,7 @@ def test_too_few_points_in_the_light_of_all_lamps_say_nothing() -> None:
     case = shot(ring(3, 35), sheen)
     few = np.zeros_like(INSIDE)
     few[10:22, 10:22] = True
-    surface, one, noise = Solving(error=True).measured(case.plates, case.lit, mask=few)
+    surface, one, noise = Solving(error=True).measured(LitPlates(case.plates, case.lit, mask=few))
     assert not np.any(looked_at(surface, one, noise)[1].by_slope_deg)
 
 

@@ -10,6 +10,7 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import MEASURED, Misfit, Reflectance, Surface
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust import few_checked, signs
@@ -158,7 +159,7 @@ def test_angles_around_are_means_of_a_gaussian() -> None:
 def test_three_lights_leave_nothing_and_six_are_solved_by_the_model(lights: int, looked_at: bool) -> None:
     normals, inside = ball()
     ways = ring(lights, 35)
-    found, one, _ = Solving(error=True).measured(shot(normals, ways, glossy), under(ways), mask=inside)
+    found, one, _ = Solving(error=True).measured(LitPlates(shot(normals, ways, glossy), under(ways), mask=inside))
     assert (few_checked.turned_by_model_deg(found, 1, one, inside) is not None) == looked_at
     model = Reflectance(curve=0.0, rough=0.5, soft=0.0, broad=0.0, middle=0.0, narrow=0.0)
     by_model = replace(found, misfit=Misfit(share=0.01, error_deg=1.0, reflectance=model))

@@ -15,6 +15,7 @@ from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, slope_ag
 from psvideo.solve.depth.view import View
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.surface_bits import stored
@@ -74,7 +75,7 @@ def judged(
     if unsure is not None:
         unsure[0, 0, 0] = 1e-6
     solved = solving.solve(plates, lit, mask=inside, unsure=unsure)
-    surface = solved if unchecked else judged_by_signs(*solving.measured(plates, lit, mask=inside))[0]
+    surface = solved if unchecked else judged_by_signs(*solving.measured(LitPlates(plates, lit, mask=inside)))[0]
     assert surface.error_deg is not None
     measured = solved.measured & inside
     apart = np.linalg.norm(surface.normals.astype(np.float64) - normals, axis=-1)[measured]
@@ -297,7 +298,7 @@ def test_waves_that_shine_are_off_by_no_more_than_twice_what_three_lights_claim_
     case = shot(*shapes()[1][1:], ring(3, 40), gloss=0.15)  # off by 6 degrees, and nothing is left over
     solving = Solving(error=True)
     surface = solving.solve(case.plates, case.lit, mask=case.mask)
-    by_signs = judged_by_signs(*solving.measured(case.plates, case.lit, mask=case.mask))[0]
+    by_signs = judged_by_signs(*solving.measured(LitPlates(case.plates, case.lit, mask=case.mask)))[0]
     assert surface.error_deg is not None
     off_deg = angles_deg(surface.normals[case.mask], case.truth[case.mask])
     claimed_deg = surface.error_deg[case.mask].astype(float)
@@ -316,7 +317,7 @@ def test_a_shadow_that_surfaces_around_light_is_not_trusted_under_three_lights_w
     shadow[31:60, 31:60] = True
     shading = np.maximum(case.truth @ case.lit.directions[0], 0.05)[..., None]
     case.plates[0][shadow] = 0.06 * (case.plates[0] / shading)[shadow]  # far above noise, as if light grazed there
-    by_three, _, _ = Solving().measured(case.plates, case.lit, mask=case.mask)
+    by_three, _, _ = Solving().measured(LitPlates(case.plates, case.lit, mask=case.mask))
     surface = Solving().solve(case.plates, case.lit, mask=case.mask)
     off_deg = angles_deg(surface.normals, case.truth)
     of_three_deg = angles_deg(by_three.normals[shadow & by_three.valid], case.truth[shadow & by_three.valid])

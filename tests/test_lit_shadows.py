@@ -11,6 +11,7 @@ from bench.predicted import SIZE
 from psvideo.model.surface import MEASURED, TWO_LIGHTS, Surface
 from psvideo.solve.filling.leaving_out import left_out
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.judging import judged, looked_at
 
@@ -33,7 +34,7 @@ def solved(
         light = 0.5 * np.maximum(normals @ way, around)
         plates.append((light + rng.normal(0, noise, light.shape)).astype(np.float32))
     lit, solving = Illumination(directions=ways, intensities=np.ones((len(ways), 1))), Solving(error=True)
-    measured = solving.measured(plates, lit, mask=INSIDE)
+    measured = solving.measured(LitPlates(plates, lit, mask=INSIDE))
     points, found = looked_at(*measured)
     shown = np.broadcast_to(found.shadows_deg, points.known.shape)
     return solving.solve(plates, lit, mask=INSIDE), shown, measured[0]
@@ -81,7 +82,7 @@ def test_under_nine_lights_none_is_left_out_since_a_byte_does_not_say_which() ->
     plates = [np.maximum(BALL @ way, 0.03).astype(np.float32) for way in ways]
     solving = Solving(solver="least-squares", error=True)
     solved_, one, noise = solving.measured(
-        plates, Illumination(directions=ways, intensities=np.ones((len(ways), 1))), mask=INSIDE
+        LitPlates(plates, Illumination(directions=ways, intensities=np.ones((len(ways), 1))), mask=INSIDE)
     )
     doubted = replace(judged(solved_, one, noise)[0], shadows_lit=1.0, valid=np.zeros_like(INSIDE))
     assert doubted.error_deg is not None

@@ -15,6 +15,7 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import Metal, Subject, Surface
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.metal.matte_plates import matte_plates, metal_doubt_deg
 from psvideo.solve.normals.metal.metal_fit import directions, metal_of
 from psvideo.solve.normals.metal.metal_kernel import fill_matte, fill_sums, fill_unlike, find_normals
@@ -85,7 +86,7 @@ def off_deg(found: NDArray[np.floating], truth: NDArray[np.floating]) -> Array:
 
 def found_in(plates: Array, lights: Array) -> Metal | None:
     """What a subject shows as metal."""
-    look = Solving().look([*plates.astype(np.float32)], under(lights))
+    look = Solving().look(LitPlates([*plates.astype(np.float32)], under(lights)))
     return None if look is None else metal_of([look])
 
 
@@ -181,7 +182,7 @@ def test_of_a_machine_only_the_metal_is_solved_as_metal() -> None:
 def test_a_take_shares_what_was_found_of_its_metal() -> None:
     plates = shot(bumps(), TWELVE, BRONZE).astype(np.float32)
     lit, alone = under(TWELVE), solved(plates, TWELVE)
-    look = Solving().look([*plates], lit)
+    look = Solving().look(LitPlates([*plates], lit))
     assert look is not None
     known = Subject(reflectance=None, metal=metal_of([look]))
     assert known.metal is not None
@@ -241,11 +242,11 @@ def test_clipped_and_dark_samples_stay_as_they_are() -> None:
     truth = bumps()
     plates = np.minimum(3 * shot(truth, TWELVE, BRONZE), 1.0).astype(np.float32)
     lit, how = under(TWELVE), Solving()
-    look = how.look([*plates], lit)
+    look = how.look(LitPlates([*plates], lit))
     assert look is not None
     metal = metal_of([look])
     assert metal is not None
-    surface, one, _ = how.measured([*plates], lit)
+    surface, one, _ = how.measured(LitPlates([*plates], lit))
     made = np.stack(matte_plates([*plates], lit, metal, surface, one.usable, seen=None, mask=None))
     kept = (plates >= 1.0) | (plates <= one.usable.dark_level)
     assert kept.mean() > 0.02
@@ -257,8 +258,8 @@ def test_clipped_and_dark_samples_stay_as_they_are() -> None:
 def test_where_kinds_of_lobes_disagree_normals_are_doubted() -> None:
     plates = shot(bumps(), TWELVE, BRONZE).astype(np.float32)
     lit, how = under(TWELVE), Solving()
-    surface, one, _ = how.measured([*plates], lit)
-    look = how.look([*plates], lit)
+    surface, one, _ = how.measured(LitPlates([*plates], lit))
+    look = how.look(LitPlates([*plates], lit))
     assert look is not None
     metal = metal_of([look])
     assert metal is not None

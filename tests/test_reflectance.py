@@ -21,6 +21,7 @@ from psvideo.solve.depth import View
 from psvideo.solve.images import solve_images
 from psvideo.solve.instants import subject_of
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
@@ -233,12 +234,12 @@ def test_what_is_unsure_for_motion_says_nothing_of_the_subject() -> None:
         surface = Solving().solve(plates, under(WAYS), unsure=off)
         assert surface.misfit is not None
         assert (surface.misfit.reflectance is not None) == found
-        look = Solving().look(plates, under(WAYS), unsure=off)
+        look = Solving().look(LitPlates(plates, under(WAYS), unsure=off))
         assert look is not None
         assert (reflectance_of([look]) is not None) == found
     patchy = np.where(np.random.default_rng(3).random(unsure.shape[1:]) < 0.5, np.float32(0.2), np.float32(0))
     unsure[5] = patchy  # what lies between is said to be sure by chance
-    assert Solving().look(plates, under(WAYS), unsure=unsure) is None
+    assert Solving().look(LitPlates(plates, under(WAYS), unsure=unsure)) is None
 
 
 def test_a_take_looks_at_what_is_sure_in_its_rounds() -> None:
@@ -347,7 +348,7 @@ def test_a_subject_that_is_known_is_solved_as_one_that_was_found() -> None:
     lit, sent = distant()
     plates = shot(waves(), sent, gloss=0.15)
     alone, matte = (Solving(subject=known).solve(plates, lit) for known in (None, Subject(reflectance=None)))
-    look = Solving().look(plates, lit)
+    look = Solving().look(LitPlates(plates, lit))
     assert look is not None
     again = Solving(subject=Subject(reflectance=reflectance_of([look]))).solve(plates, lit)
     assert again.normals.tobytes() == alone.normals.tobytes()
@@ -360,7 +361,8 @@ def test_a_subject_that_is_known_is_solved_as_one_that_was_found() -> None:
 def test_what_one_look_at_a_subject_cannot_show_another_does() -> None:
     """A round in which clay stands flat before the camera says nothing of it, and takes nothing from one that does."""
     flat = np.broadcast_to([0.0, 0.0, 1.0], (SIZE, SIZE, 3))
-    looks = [Solving().look(clay(normals, WAYS, roughness=0.5), under(WAYS)) for normals in (flat, waves())]
+    clays = [clay(normals, WAYS, roughness=0.5) for normals in (flat, waves())]
+    looks = [Solving().look(LitPlates(plates, under(WAYS))) for plates in clays]
     of_flat, of_waves = (look for look in looks if look is not None)
     assert reflectance_of([of_flat]) is None
     alone, together = reflectance_of([of_waves]), reflectance_of([of_flat, of_waves])

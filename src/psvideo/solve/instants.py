@@ -21,18 +21,17 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Subject, Surface
 from psvideo.plates.align.denoise import Average, ResultNoise, added, averaged
-from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.solve.at_rest import AtRest
 from psvideo.solve.depth import View, view_of
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.lit_plates import LitPlates, Plates
 from psvideo.solve.normals.metal.metal_fit import metal_of
 from psvideo.solve.normals.plate_noise import spread_of
 from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving, most_claimed_deg
-from psvideo.solve.normals.task import Samples
 from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of
 from psvideo.solve.steady import SHOWN, Steady, steadied
@@ -104,13 +103,28 @@ def subject_of(
 
 @dataclass(frozen=True, kw_only=True)
 class _Given:
-    """A round as the solver takes it: pictures, which rows or pixels every light shows (``shown`` is None where that is
-    all), and where to solve."""
+    """A round as ``LitPlates`` but for their light, which near lights' change as the surface is found. ``seen`` is what
+    every light shows, ``shown`` the same, or None where that is all."""
 
-    plates: Sequence[Samples] | Sequence[Mixture]
+    plates: Plates
     seen: NDArray[np.bool_]
     shown: NDArray[np.bool_] | None
     mask: NDArray[np.bool_] | None
+    unsure: NDArray[np.float32] | None
+    moves: NDArray[np.bool_] | None
+    steadied: bool
+
+    def under(self, lit: Illumination) -> LitPlates:
+        """Return the plates as this light shows them."""
+        return LitPlates(
+            plates=self.plates,
+            lit=lit,
+            seen=self.shown,
+            mask=self.mask,
+            unsure=self.unsure,
+            moves=self.moves,
+            steadied=self.steadied,
+        )
 
 
 @dataclass(kw_only=True)
@@ -177,8 +191,7 @@ class _RoundSolver:
         """Return points of one round's subject, under near lights where its depth puts them."""
         given = self._given(one)
         lit = self._light(one)(ground=None) if self.near is None else self._surface(one, given)[1]
-        unsure = _unsure(one, self.shares)
-        return self.solving.look(given.plates, lit, seen=given.shown, mask=given.mask, unsure=unsure)
+        return self.solving.look(given.under(lit))
 
     def _given(self, one: Round) -> _Given:
         whole = all(plate.seen.ndim == 1 for plate in one.plates)
@@ -188,6 +201,9 @@ class _RoundSolver:
             seen=seen,
             shown=None if seen.all() else seen,
             mask=None if self.masks is None else self.masks.at(one.number),
+            unsure=_unsure(one, self.shares),
+            moves=None if one.motion is None else one.motion.moves,
+            steadied=one.motion is not None and one.motion.steadied,
         )
 
     def _scaled(self, one: Round) -> list[Light]:
@@ -200,25 +216,19 @@ class _RoundSolver:
     def _surface(self, one: Round, given: _Given) -> tuple[Surface, Illumination]:
         """Return a round's surface, and the light that it was solved with in the end: near lights' changes on the way
         as the surface is found."""
-        plates, seen, mask, light = given.plates, given.shown, given.mask, self._light(one)
-        unsure = _unsure(one, self.shares)
-        moves, steadied = (None, False) if one.motion is None else (one.motion.moves, one.motion.steadied)
-        here = None if self.near is None else swept(self.near.at(one.number), self._scaled(one), plates, seen=seen)
+        light, near = self._light(one), None if self.near is None else self.near.at(one.number)
+        here = None if near is None else swept(near, self._scaled(one), given.plates, seen=given.shown)
         lit = light(ground=None if here is None else here.ground)
 
         def solve(found: Illumination) -> Surface:
             nonlocal lit
             lit = found
-            return self.solving.solve(
-                plates, found, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied
-            )
+            return self.solving.solve_again(given.under(found))[0]
 
         if here is not None:
             return solve_near(here, lambda ground: light(ground=ground), solve), lit
         before = Doubts() if self.at_rest is None else self.at_rest.until(one)
-        surface, doubts = self.solving.solve_again(
-            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied, before=before
-        )
+        surface, doubts = self.solving.solve_again(given.under(lit), before=before)
         alone = self.one_by_one or (self.masks is not None and self.masks.still is None)
         self.at_rest = None if alone else AtRest.since(one, doubts)
         return surface, lit
@@ -249,7 +259,7 @@ def _shown(seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(rows & cols)
 
 
-def _pictures(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> Sequence[Samples] | Sequence[Mixture]:
+def _pictures(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> Plates:
     """Return a round's plates on a scale on which they are clipped at 1.0, and evened; made only where that asks it."""
     if shares is None and all(plate.saturation == 1.0 for plate in one.plates):
         return [plate.picture for plate in one.plates]

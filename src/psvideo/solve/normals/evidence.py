@@ -1,16 +1,15 @@
 """One round as the solvers take it, for those who look at it again: what is judged and what is filled."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import NamedTuple
 
 from psvideo.model.arrays import Floats, Mask
-from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
-from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.loops.blocks import working_memory
-from psvideo.solve.normals.task import Samples, Task, Usable, Work, task
+from psvideo.solve.normals.task import Task, Usable, Work, task
 
 GRID_PX = 480
 """The points at which surfaces are judged are at most this many along the longer side."""
@@ -35,24 +34,15 @@ class Left(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
+class Evidence(LitPlates):
     """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on.
 
-    ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
-    ``moves`` (row, col), on that grid, where something was followed; ``steadied``: beside that plates were brought
-    together by one shift of the whole picture. ``indirect`` is what the solver saw on its way, and ``left``, where
+    ``indirect`` is what the solver saw on its way, and ``left``, where
     plates are unsure. ``metal_deg`` is by how much normals of metal may be off because what it shows is not known
     better, at these points. ``grid_px`` is how many points there are at most along the longer side.
     """
 
-    plates: Sequence[Samples] | Sequence[Mixture]
-    lit: Illumination
     usable: Usable
-    seen: Mask | None = None
-    mask: Mask | None = None
-    unsure: Floats | None = None
-    moves: Mask | None = None
-    steadied: bool = False
     indirect: Indirect | None = None
     left: Left | None = None
     metal_deg: Floats | None = None
@@ -61,10 +51,11 @@ class Evidence:
     spare: Path | None = None
     grid_px: int = GRID_PX
 
-    @property
-    def moved(self) -> bool:
-        """Whether any plate may be off for motion."""
-        return self.unsure is not None and bool(self.unsure.any())
+    @classmethod
+    def of(cls, given: LitPlates, usable: Usable, *, spare: Path | None, grid_px: int) -> "Evidence":
+        """Return the evidence that plates give before a solver has seen them."""
+        shown = {field.name: getattr(given, field.name) for field in fields(LitPlates)}
+        return cls(**shown, usable=usable, spare=spare, grid_px=grid_px)
 
     def step_of(self, shape: tuple[int, ...]) -> int:
         """Return how many rows and columns of a picture lie between two points at which it is judged."""

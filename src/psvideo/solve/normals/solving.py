@@ -1,6 +1,5 @@
 """Which solver a run uses, and what it is asked for: chosen once, carried to every round."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -10,22 +9,21 @@ import numpy as np
 from psvideo.model.arrays import Floats, Mask
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Metal, Subject, Surface
-from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates, Plates
 from psvideo.solve.normals.plate_noise import PlateNoise, noise_of
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import LIGHTS_FOR_REFLECTANCE
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
-from psvideo.solve.normals.task import Looks, Samples, Usable
+from psvideo.solve.normals.task import Looks, Usable
 from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import Judging, emptied, judged, with_unchecked
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
 
-Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
 ROBUST_FROM_LIGHTS = 5
 """With five lights a highlight and a shadow can both be seen; with fewer there is nothing to weigh."""
@@ -77,36 +75,21 @@ class Solving:
         mask: Mask | None = None,
         unsure: Floats | None = None,
         moves: Mask | None = None,
-        steadied: bool = False,
     ) -> Surface:
-        """Return the surface that explains one plate per light; see the solvers for the arguments, and ``Evidence`` for
-        what is unsure of the plates, ``moves`` and is ``steadied``."""
-        return self.solve_again(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied)[0]
+        """Return the surface that explains one plate per light; see ``LitPlates`` for the arguments."""
+        return self.solve_again(LitPlates(plates=plates, lit=lit, seen=seen, mask=mask, unsure=unsure, moves=moves))[0]
 
-    def solve_again(
-        self,
-        plates: Plates,
-        lit: Illumination,
-        *,
-        seen: Mask | None = None,
-        mask: Mask | None = None,
-        unsure: Floats | None = None,
-        moves: Mask | None = None,
-        steadied: bool = False,
-        before: Doubts = Doubts(),
-    ) -> tuple[Surface, Doubts]:
+    def solve_again(self, given: LitPlates, *, before: Doubts = Doubts()) -> tuple[Surface, Doubts]:
         """Return the same, and how far it may be off beyond noise, with what was known of that ``before``, of rounds in
         which everything stood as it does."""
         from psvideo.solve.filling.filled import filled
         from psvideo.solve.filling.leaving_out import left_out
 
         how, metal_deg = self, None
-        if (metal := self._metal(plates, lit, seen=seen, mask=mask, unsure=unsure)) is not None:
-            plates, metal_deg = self._as_matte(plates, lit, metal, seen=seen, mask=mask, unsure=unsure)
+        if (metal := self._metal(given)) is not None:
+            given, metal_deg = self._as_matte(given, metal)
             how = replace(self, subject=MATTE)
-        solved, one, noise = how.measured(
-            plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves, steadied=steadied, noise=before.known_noise
-        )
+        solved, one, noise = how.measured(given, noise=before.known_noise)
         one = replace(one, metal_deg=metal_deg)
         known, doubts = judged(solved, one, noise, before=before)
         without = left_out(known, one, solved=solved.valid) if self.fill else None
@@ -120,81 +103,48 @@ class Solving:
         whole = filled(known, one, solved=valid, noise=noise.dark, without=without) if self.fill else emptied(known)
         return with_unchecked(whole, one, noise), doubts
 
-    def _metal(
-        self, plates: Plates, lit: Illumination, *, seen: Mask | None, mask: Mask | None, unsure: Floats | None
-    ) -> Metal | None:
+    def _metal(self, given: LitPlates) -> Metal | None:
         """Return what the subject shows as metal; None where it is none, or is not asked for it."""
         from psvideo.solve.normals.metal.metal_fit import LIGHTS_FOR_METAL, metal_of
 
-        if not self.metal or len(plates) < LIGHTS_FOR_METAL or not self.looks_at_subject(len(plates)):
+        lights = len(given.plates)
+        if not self.metal or lights < LIGHTS_FOR_METAL or not self.looks_at_subject(lights):
             return None
         if self.subject is not None:
             return self.subject.metal
-        points = self.look(plates, lit, seen=seen, mask=mask, unsure=unsure)
+        points = self.look(given)
         return None if points is None else metal_of([points])
 
-    def _as_matte(
-        self, plates: Plates, lit: Illumination, metal: Metal,
-        *, seen: Mask | None, mask: Mask | None, unsure: Floats | None,
-    ) -> tuple[Plates, Floats]:  # fmt: skip
+    def _as_matte(self, given: LitPlates, metal: Metal) -> tuple[LitPlates, Floats]:
         """Return plates as a matte surface with the same normals would show them, and by how much these may be off for
         what is not known of the metal."""
         from psvideo.solve.normals.metal.matte_plates import matte_plates, metal_doubt_deg
 
-        solved, one, _ = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure)
+        plates, lit, seen = given.plates, given.lit, given.seen
+        solved, one, _ = self.measured(replace(given, moves=None, steadied=False))
         step = one.step_of(solved.valid.shape)
         doubt = metal_doubt_deg(plates, lit, metal, solved, one.usable, seen=seen, step=step)
-        made = matte_plates(plates, lit, metal, solved, one.usable, seen=seen, mask=mask, spare=self.spare)
-        return made, doubt
+        made = matte_plates(plates, lit, metal, solved, one.usable, seen=seen, mask=given.mask, spare=self.spare)
+        return replace(given, plates=made), doubt
 
-    def look(
-        self,
-        plates: Plates,
-        lit: Illumination,
-        *,
-        seen: Mask | None = None,
-        mask: Mask | None = None,
-        unsure: Floats | None = None,
-    ) -> SubjectPoints | None:
+    def look(self, given: LitPlates) -> SubjectPoints | None:
         """Return points from which the subject's reflectance is found, None where it is not looked at or shows none;
         those whose plates are ``unsure`` for motion say nothing of it."""
-        if not self.looks_at_subject(len(plates)):
+        if not self.looks_at_subject(len(given.plates)):
             return None
-        noise = noise_of(plates, lit)
-        usable = _usable(noise, lit, "robust")
+        noise = noise_of(given.plates, given.lit)
+        usable = _usable(noise, given.lit, "robust")
         return huber1981.look(
-            plates, lit, seen=seen, mask=mask, usable=usable, reweighting=EVERYTHING, plate_noise=noise,
-            spare=self.spare, unsure=unsure,
+            given.plates, given.lit, seen=given.seen, mask=given.mask, usable=usable, reweighting=EVERYTHING,
+            plate_noise=noise, spare=self.spare, unsure=given.unsure,
         )  # fmt: skip
 
-    def measured(
-        self,
-        plates: Plates,
-        lit: Illumination,
-        *,
-        seen: Mask | None = None,
-        mask: Mask | None = None,
-        unsure: Floats | None = None,
-        moves: Mask | None = None,
-        steadied: bool = False,
-        noise: PlateNoise | None = None,
-    ) -> tuple[Surface, Evidence, PlateNoise]:
+    def measured(self, given: LitPlates, *, noise: PlateNoise | None = None) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by; ``noise`` is that of
         the plates, where it is known."""
-        noise = noise_of(plates, lit) if noise is None else noise
-        usable = _usable(noise, lit, self.method(len(plates)))
-        one = Evidence(
-            plates=plates,
-            lit=lit,
-            usable=usable,
-            seen=seen,
-            mask=mask,
-            unsure=unsure,
-            moves=moves,
-            steadied=steadied,
-            spare=self.spare,
-            grid_px=self.grid_px,
-        )
+        noise = noise_of(given.plates, given.lit) if noise is None else noise
+        usable = _usable(noise, given.lit, self.method(len(given.plates)))
+        one = Evidence.of(given, usable, spare=self.spare, grid_px=self.grid_px)
         looks = IndirectLook.of(one, noise)
         solved = self._solved(one, noise, looks)
         return solved, replace(one, indirect=looks.found, left=looks.left if looks.left.lights.size else None), noise

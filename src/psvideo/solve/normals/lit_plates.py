@@ -1,0 +1,36 @@
+"""One plate per light, the light that each shows, and what of them counts: what every solver starts from."""
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+
+from psvideo.model.arrays import Floats, Mask
+from psvideo.plates.mixing.mixture import Mixture
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import Samples
+
+Plates = Sequence[Samples] | Sequence[Mixture]
+
+
+@dataclass(frozen=True)
+class LitPlates:
+    """Plates (row, col[, channel]) and the light that falls on what they show.
+
+    ``seen``: which rows (light, row) or pixels (light, row, col) every light shows; ``mask`` (row, col): where to
+    solve; both everything where they are left out. ``unsure`` (light, row, col), on a grid of its own over the picture,
+    is by how much plates may be off for motion; ``moves`` (row, col), on that grid, where something was followed;
+    ``steadied``: beside that plates were brought together by one shift of the whole picture.
+    """
+
+    plates: Plates
+    lit: Illumination
+    _: KW_ONLY
+    seen: Mask | None = None
+    mask: Mask | None = None
+    unsure: Floats | None = None
+    moves: Mask | None = None
+    steadied: bool = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether any plate may be off for motion."""
+        return self.unsure is not None and bool(self.unsure.any())
