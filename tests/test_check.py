@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from filmed import filmed
 from picture_file import read_picture
+from written_movies import write_rgb16
 
 import psvideo as ps
 from psvideo.cli.app import main
@@ -90,7 +91,14 @@ def test_an_alpha_channel_that_is_left_out_costs_nothing_and_what_costs_accuracy
     assert "This take is usable." in said
     assert "note      the PNG files' alpha channel is left out" in said
     warned = Check(
-        clip="c", path=tmp_path, frames=1, looked_at=1, seconds=0.1, judgements=(), warnings=("H.264 costs accuracy",)
+        clip="c",
+        path=tmp_path,
+        frames=1,
+        looked_at=1,
+        judged=(1, 1),
+        seconds=0.1,
+        judgements=(),
+        warnings=("H.264 costs accuracy",),
     )
     assert warned.verdict == "This take is usable, with reservations."
 
@@ -141,7 +149,7 @@ def test_more_frames_are_looked_at_before_a_strobe_is_said_to_be_missing(
             raise NoStrobeError("no strobe in so few")
         return find_timing(take, **others)
 
-    monkeypatch.setattr("psvideo.runs.check.find_timing", only_in_many)
+    monkeypatch.setattr("psvideo.runs.steps.where_to_look.find_timing", only_in_many)
     monkeypatch.setattr("psvideo.runs.steps.checked_frames.LEAST_FRAMES", 1)
     monkeypatch.setattr("psvideo.runs.steps.checked_frames.ROUNDS", 2)
     assert run("check", shot("good"), "--json") == 0
@@ -221,25 +229,13 @@ def test_a_movie_is_not_decoded_to_its_end(
 
     clip = shot("good")
     frames = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]
-    write_movie(tmp_path / "take.mkv", frames * 8)
+    write_rgb16(tmp_path / "take.mkv", frames * 8, rate=100)
     shutil.copy(clip / "plan.toml", tmp_path / "plan.toml")
     decoded: list[int] = []
     picture = movie_codes.rgb_codes
     monkeypatch.setattr(movie_frames, "rgb_codes", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
     run("check", tmp_path / "take.mkv", "-q")
     assert 20 < len(decoded) < 60
-
-
-def write_movie(path: Path, frames: list[np.ndarray]) -> None:
-    import av
-
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("ffv1", rate=100, options={"threads": "1"})
-        stream.width, stream.height, stream.pix_fmt = frames[0].shape[1], frames[0].shape[0], "gbrp16le"
-        for frame in frames:
-            shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame[..., ::-1]), format="rgb48le")
-            container.mux(stream.encode(shown.reformat(format="gbrp16le")))
-        container.mux(stream.encode(None))
 
 
 def looks(folder: Path, changes: list[Callable[[], object]], **options: Any) -> list[list[str]]:
@@ -361,7 +357,7 @@ def test_a_check_of_several_takes_that_is_stopped_is_no_pass(
     shot: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def stopped(clips: list[Path], **_: object) -> Iterator[Check]:
-        yield Check(clip="good", path=clips[0], frames=9, looked_at=9, seconds=1.0, judgements=())
+        yield Check(clip="good", path=clips[0], frames=9, looked_at=9, judged=(1, 9), seconds=1.0, judgements=())
         raise KeyboardInterrupt
 
     monkeypatch.setattr("psvideo.runs.many_takes.check_folder.check_takes", stopped)

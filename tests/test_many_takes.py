@@ -24,7 +24,9 @@ def line(subject: str, grade: Any) -> Judgement:
 
 
 def check(name: str, *judgements: Judgement) -> Check:
-    return Check(clip=name, path=Path(name), frames=10, looked_at=5, seconds=1.0, judgements=(GOOD, *judgements))
+    return Check(
+        clip=name, path=Path(name), frames=10, looked_at=5, judged=(1, 5), seconds=1.0, judgements=(GOOD, *judgements)
+    )
 
 
 def result(name: str, *judgements: Judgement) -> TakeResult:

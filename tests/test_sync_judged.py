@@ -168,6 +168,7 @@ NOTHING = {
     "lens cap": (1e-4 * RNG.standard_normal((40, ROWS)), "is noise"),
     "noisy grey": (0.5 + 0.01 * RNG.standard_normal((40, ROWS)), "is noise"),
     "noise of 8 frames": (0.5 + 0.01 * RNG.standard_normal((8, ROWS)), "is noise"),
+    "a stray sample in the first row": (np.pad([[0.01]], ((20, 19), (0, ROWS - 1))), "is noise"),
     "3 frames": (RNG.random((3, ROWS)), "needs at least 6"),
     "5 frames": (RNG.random((5, ROWS)), "needs at least 6"),
 }

@@ -72,13 +72,13 @@ def test_a_strobe_that_begins_a_little_late_is_timed_also_where_a_frame_is_lost(
     shot = shot_of(plan)
     profiles = profiles_of(shot, slice(0, late))
     profiles[57] = 0.0
-    timing = timing_from_rows(plan, np.arange(FRAMES), profiles)
+    timing = timing_from_rows(plan, np.arange(FRAMES), profiles, numbers=range(1001, 1001 + FRAMES))
     true_s = np.array([flash.start_s for flash in shot.flashes])
     off_s = np.abs(true_s[:, None] - timing.start_s).min(axis=0)
     assert off_s.max() < 0.03 * plan.camera.row_time_s
     assert timing.repeated_frames == ()
     assert timing.dropped_frames == ()
-    assert any(f"No flash lights {late} frames in a row, 0 to {late - 1}" in note for note in timing.notes)
+    assert any(f"No flash lights {late} frames in a row, 1001 to {1000 + late}:" in note for note in timing.notes)
 
 
 def test_dark_slots_and_repeated_frames_are_not_left_out(make_plan: PlanMaker) -> None:

@@ -62,3 +62,15 @@ def grey_ramp(count: int, *, rows: int = 32, cols: int = 48) -> list[av.VideoFra
 
 def in_10_bits(frames: Iterable[av.VideoFrame]) -> list[av.VideoFrame]:
     return [frame.reformat(format="yuv422p10le") for frame in frames]
+
+
+def write_rgb16(path: Path, frames: Iterable[NDArray[Any]], *, rate: int) -> None:
+    """Write 16-bit frames, (row, col) or (row, col, channel) in OpenCV's order of blue, green and red, as FFV1."""
+    colour = [frame if frame.ndim == 3 else np.repeat(frame[..., None], 3, axis=2) for frame in frames]
+    with av.open(str(path), "w") as container:
+        stream: Any = container.add_stream("ffv1", rate=rate, options={"threads": "1"})
+        stream.width, stream.height, stream.pix_fmt = colour[0].shape[1], colour[0].shape[0], "gbrp16le"
+        for frame in colour:
+            shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame[..., ::-1]), format="rgb48le")
+            container.mux(stream.encode(shown.reformat(format="gbrp16le")))
+        container.mux(stream.encode(None))

@@ -2,20 +2,19 @@
 
 import tempfile
 import time
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from psvideo.clip import Clip, Kept, Take, keeping_near
+from psvideo.clip import Clip, Kept, keeping_near
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import NoStrobeError, UsageError
+from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.timing import Timing
 from psvideo.plates.naming import named_by_rig
-from psvideo.report.judge.of_frames import exposure_of_frames
+from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames
 from psvideo.report.judgement import Judgement
 from psvideo.runs.instants.checked_rounds import lines_of
 from psvideo.runs.steps.caller import PYTHON, Caller
@@ -24,14 +23,13 @@ from psvideo.runs.steps.checked_frames import (
     frames_to_check,
     later_light,
     later_numbers,
+    light_by_number,
     light_of_frames,
-    more_frames,
-    too_short,
     with_later_holes,
 )
 from psvideo.runs.steps.saturation import saturation_of
+from psvideo.runs.steps.where_to_look import LookedAt, in_vain_words, look, where_words
 from psvideo.sync.open_take import open_take
-from psvideo.sync.take_timing import find_timing
 
 EXPOSED_FRAMES = 12
 """About this many frames show how a clip without a strobe is exposed."""
@@ -50,6 +48,9 @@ def check(
     caller: Caller = PYTHON,
 ) -> Check:
     """Judge a take in seconds by frames from its start and a few from the rest, one line for each thing.
+
+    Where the start shows no strobe, or far less light than the rest, that part is judged which shows most of it, and a
+    note says which.
 
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage.
@@ -116,32 +117,27 @@ def judged_take(
     clip = whole.clip
     known = None if rig is None else read_rig(rig_of_take(rig, path), plan_lights=clip.plan.lights)
     window = frames_to_check(clip.plan, clip.numbers)
-    later = later_numbers(clip, window)
     with _store(clip, window) as kept:
-        take = replace(whole, numbers=window, kept=kept)
-        try:
-            take, timing = _timed(take, first_light, watch)
-        except NoStrobeError as fault:
-            if too_short(clip.plan, window):
-                raise
-            lines: tuple[Judgement, ...] = (
-                _unseen(str(fault)),
-                saturation_of(take) or exposure_of_frames(light_of_frames(take, EXPOSED_FRAMES)),
-            )
-            judged, notes = "", tuple[str, ...]()
+        start = replace(whole, numbers=window, kept=kept)
+        late = light_by_number(start, later_numbers(clip, window))
+        looked = look(start, late.values(), first_light=first_light, watch=watch)
+        take, timing = looked.take, looked.timing
+        if timing is None:
+            lines, judged, notes = _without_strobe(looked, late.values()), "", tuple[str, ...]()
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = with_later_holes(timing, clip)
-            later = tuple(number for number in later if number > take.numbers[-1])
-            lines = (*lines_of(take, timing, known, watch=watch), *later_light(take, later))
+            rest = [light for number, light in late.items() if number not in take.numbers]
+            lines = (*lines_of(take, timing, known, watch=watch), *later_light(take, rest, elsewhere=looked.moved))
             judged = clip.curve_doubt
             said = {one.sentence for one in (timing.swing, timing.half) if one}
-            notes = tuple(note for note in timing.notes if note not in said)
+            notes = (*where_words(looked), *(note for note in timing.notes if note not in said))
     return Check(
         clip=clip.name,
         path=path,
         frames=len(clip.numbers),
-        looked_at=len(take.numbers) + len(later),
+        looked_at=len({*looked.numbers, *late}),
+        judged=(take.numbers[0], take.numbers[-1]),
         seconds=time.monotonic() - began,
         judgements=tuple(one.spelled(caller.spell) for one in lines),
         warnings=tuple(caller.spell(one) for one in clip.warnings if one != judged),
@@ -149,19 +145,17 @@ def judged_take(
     )
 
 
-def _timed(take: Take, first_light: str | None, watch: Watch) -> tuple[Take, Timing]:
-    """Return when a take's flashes fired, and the take with the frames that showed it: as many again, up to a bound,
-    where the first ones are too few, as beside frames that are missing. Raises NoStrobeError where neither show it."""
-    try:
-        return take, find_timing(take, first_light=first_light, watch=watch)
-    except NoStrobeError:
-        more = more_frames(take)
-        if not more:
-            raise
-        wider = replace(take, numbers=more)
-        with suppress(NoStrobeError):
-            return wider, find_timing(wider, first_light=first_light, watch=watch)
-        raise
+def _without_strobe(looked: LookedAt, late: Iterable[FrameLight]) -> tuple[Judgement, ...]:
+    """Judge a take in which no strobe was found, at none of the parts that were looked at."""
+    lights = [
+        *light_of_frames(looked.take, EXPOSED_FRAMES),
+        *late,
+        *(one for at in looked.glances for one in at.lights),
+    ]
+    return (
+        Judgement(subject="strobe", grade="bad", found=in_vain_words(looked)),
+        saturation_of(looked.take) or exposure_of_frames(lights),
+    )
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:
@@ -170,7 +164,3 @@ def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | N
     if 2 * samples * len(window) > MOST_KEPT_BYTES:
         return nullcontext(None)
     return keeping_near(Path(tempfile.gettempdir()) / "psvideo-check")
-
-
-def _unseen(reason: str) -> Judgement:
-    return Judgement(subject="strobe", grade="bad", found=reason)

@@ -66,7 +66,7 @@ def timing_of_take(take: FramesTaken, strobe: FoundStrobe, *, breaks: tuple[bool
     notes = (
         *remarks(plan, found, swing=swing, half=half),
         *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
-        *remarks_on_frames(plan, found, take.indices),
+        *remarks_on_frames(plan, found, take.numbers),
         *remarks_on_black(found, black, take.numbers),
         *remarks_on_unfired(found, seen, fired, take.numbers),
     )

@@ -128,8 +128,7 @@ def _print_check(voice: Voice, check: "Check") -> None:
 
         print_json(json_text.dumps(check_record(check)))
         return
-    looked = f"{check.looked_at} of {check.frames} frames looked at, {check.seconds:.1f} s"
-    voice.say(f"{check.path}: {check.verdict} ({looked})")
+    voice.say(f"{check.path}: {check.verdict} ({check.looked}, {check.seconds:.1f} s)")
     for one in check.judgements:
         voice.say(f"  {_word(one.grade)} {one.subject:9} {one.sentence}")
     for warning in check.warnings:

@@ -51,19 +51,22 @@ def exposure_of_frames(frames: Sequence[FrameLight]) -> Judgement:
     )
 
 
-def later_frames(early: Sequence[FrameLight], late: Sequence[FrameLight]) -> Judgement:
-    """Judge whether frames from the rest of a take are as bright as those from its start; at least one of each."""
+def later_frames(early: Sequence[FrameLight], late: Sequence[FrameLight], *, elsewhere: bool = False) -> Judgement:
+    """Judge whether frames from the rest of a take are as bright as those from its start; at least one of each.
+    ``elsewhere``: another part than the start was looked at."""
+    rest, those = ("Elsewhere", "in the frames looked at") if elsewhere else ("Later", "at its start")
     first, then = (max(1e-6, *(frame.top for frame in frames)) for frames in (early, late))
     ratio = then / first
     if DARKER < ratio < BRIGHTER:
         return Judgement(
-            subject="later", grade="good", found="Later in the take the picture is as bright as at its start."
+            subject="later", grade="good", found=f"{rest} in the take the picture is as bright as {those}."
         )
     change = abs(np.log2(max(ratio, 1e-6)))
     word = "brighter" if ratio > 1 else "darker"
     return Judgement(
         subject="later",
         grade="bad" if ratio < DARKER / 4 else "doubtful",
-        found=f"Later in the take the picture is {change:.1f} stops {word} than at its start.",
-        advice="Check that the strobe ran to the end, and that exposure, gain and aperture are fixed.",
+        found=f"{rest} in the take the picture is {change:.1f} stops {word} than {those}.",
+        advice="Check that the strobe ran to the end, and that exposure, gain and aperture are fixed. A subject that "
+        "came or went does the same.",
     )

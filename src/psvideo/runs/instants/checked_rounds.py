@@ -54,8 +54,9 @@ def _observed(take: Take, timing: Timing, rig: Rig | None, watch: Watch) -> tupl
         del one
     if not observed.facts:
         raise PsvideoError(
-            f"{take.clip.path}: its first {len(take.numbers)} frames hold no round in which a light is complete. Film "
-            "longer: a round needs as many frames as it has flashes, and one or two more."
+            f"{take.clip.path}: the frames looked at, {take.numbers[0]} to {take.numbers[-1]}, hold no round in "
+            "which a light is complete. Film longer: a round needs as many frames as it has flashes, and one "
+            "or two more."
         )
     return observed, solved
 

@@ -16,13 +16,15 @@ SCHEMA = "psvideo-check/1"
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What was found of one take, line by line; ``looked_at`` of its ``frames`` frames were decoded. ``warnings`` say
-    what of the footage itself may cost accuracy, ``notes`` what else is worth a word."""
+    """What was found of one take, line by line; ``looked_at`` of its ``frames`` frames were decoded, and ``judged`` are
+    the first and the last number of those that the lines are about. ``warnings`` say what of the footage itself may
+    cost accuracy, ``notes`` what else is worth a word."""
 
     clip: str
     path: Path
     frames: int
     looked_at: int
+    judged: tuple[int, int]
     seconds: float
     judgements: tuple[Judgement, ...]
     warnings: tuple[str, ...] = ()
@@ -32,6 +34,12 @@ class Check:
     def usable(self) -> bool:
         """Whether nothing is bad."""
         return usable(self.judgements)
+
+    @property
+    def looked(self) -> str:
+        """How many frames were looked at, and which the lines are about."""
+        first, last = self.judged
+        return f"{self.looked_at} of {self.frames} frames looked at, {first} to {last} judged"
 
     @property
     def verdict(self) -> str:
@@ -56,6 +64,7 @@ def check_record(check: Check) -> dict[str, object]:
         "notes": list(check.notes),
         "frames": check.frames,
         "looked_at": check.looked_at,
+        "judged": list(check.judged),
         "seconds": round(check.seconds, 2),
     }
 
@@ -115,7 +124,7 @@ def _take(check: Check) -> str:
         f'<section><div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(check.clip)}: '
         f"{html.escape(check.verdict)}</p></div>{judgement_lines(check.judgements)}"
         + (f"<ul>{notes}</ul>" if notes else "")
-        + f'<p class="soft">{html.escape(str(check.path))}: {check.looked_at} of {check.frames} frames looked at</p>'
+        + f'<p class="soft">{html.escape(str(check.path))}: {check.looked}</p>'
         "</section>"
     )
 

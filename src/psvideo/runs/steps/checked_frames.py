@@ -33,11 +33,18 @@ def frames_to_check(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
     return tuple(numbers[: min(max(math.ceil(wanted), LEAST_FRAMES), MOST_FRAMES)])
 
 
+def numbers_from(clip: Clip, first: int, count: int) -> tuple[int, ...]:
+    """Return the numbers of so many frames from the ``first`` place on, or before it where the clip ends sooner."""
+    first = max(min(first, len(clip.numbers) - count), 0)
+    return tuple(clip.numbers[first : first + count])
+
+
 def more_frames(take: Take) -> tuple[int, ...]:
-    """Return the frames to look at where a take's first ones show no strobe: as many again, up to a bound; empty where
+    """Return the frames to look at where some of a take's show no strobe: as many again, up to a bound; empty where
     the clip has no more."""
-    more = take.clip.numbers[: min(WIDER * len(take.numbers), MOST_FRAMES)]
-    return tuple(more) if len(more) > len(take.numbers) else ()
+    wider = max(min(WIDER * len(take.numbers), MOST_FRAMES), len(take.numbers))
+    more = numbers_from(take.clip, take.clip.numbers.index(take.numbers[0]), wider)
+    return more if len(more) > len(take.numbers) else ()
 
 
 def too_short(plan: Plan, numbers: Sequence[int]) -> bool:
@@ -60,15 +67,18 @@ def with_later_holes(timing: Timing, clip: Clip) -> Timing:
     return replace(timing, dropped_frames=(*timing.dropped_frames, *more))
 
 
+def light_by_number(take: Take, numbers: Sequence[int]) -> dict[int, FrameLight]:
+    """Measure single frames of a take."""
+    return {one.number: frame_light(one.image) for one in read_frames(take.clip, numbers, kept=take.kept)}
+
+
 def light_of_frames(take: Take, count: int) -> list[FrameLight]:
     """Measure about this many of a take's frames, spread over them."""
     numbers = take.numbers[:: max(len(take.numbers) // count, 1)]
     return [frame_light(frame.image) for frame in read_frames(take.clip, numbers, kept=take.kept)]
 
 
-def later_light(take: Take, later: tuple[int, ...]) -> tuple[Judgement, ...]:
-    """Judge frames from the rest of the take against those from its start; nothing where there are none."""
-    if not later:
-        return ()
-    late = [frame_light(frame.image) for frame in read_frames(take.clip, later, kept=take.kept)]
-    return (later_frames(light_of_frames(take, EARLY_FRAMES), late),)
+def later_light(take: Take, late: Sequence[FrameLight], *, elsewhere: bool) -> tuple[Judgement, ...]:
+    """Judge frames from the rest of the take against those that were looked at; nothing where there are none.
+    ``elsewhere``: these are not the take's start."""
+    return (later_frames(light_of_frames(take, EARLY_FRAMES), late, elsewhere=elsewhere),) if late else ()

@@ -83,7 +83,8 @@ def _likeness(changes: np.ndarray) -> float:
     if changes.shape[1] < 2:
         return 1.0
     above, below = changes[:, :-1], changes[:, 1:]
-    return float((above * below).sum() / np.sqrt((above**2).sum() * (below**2).sum()))
+    together = float(np.sqrt((above**2).sum() * (below**2).sum()))  # 0 where but the first or the last row changes
+    return float((above * below).sum()) / together if together else 0.0
 
 
 def why_not(plan: Plan, rows: Profiles) -> str:
