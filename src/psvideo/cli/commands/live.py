@@ -12,11 +12,9 @@ from psvideo.cli.console import Voice, print_json
 from psvideo.cli.ending import stoppable
 from psvideo.cli.live_lines import LiveLines
 from psvideo.cli.options.clip_and_run import FirstLight, Force, PlanPath
+from psvideo.cli.options.live import HoldingWords, IncomingWords, LivePageWords, PaceWords
 from psvideo.cli.options.records import spread
-from psvideo.cli.options.strobe import Yes
 from psvideo.errors import UsageError
-from psvideo.model.choices import Pace
-from psvideo.strobe.link.ports import AUTO
 
 STOPS = 2
 """The first Ctrl-C is how a live run ends; a second one leaves out what still waits for the disk."""
@@ -46,41 +44,10 @@ def live(
     list_all: Annotated[
         bool, typer.Option("--list", help="List cameras, video devices and strobe boards, and stop.")
     ] = False,
-    growing: Annotated[
-        bool, typer.Option("--growing", help="The source is a folder that a recorder is still writing.")
-    ] = False,
-    raw: Annotated[
-        str | None,
-        typer.Option("--raw", help="Pixel format of a raw stream, in FFmpeg's words: gray, gray16le, rgb24."),
-    ] = None,
-    record: Annotated[
-        Path | None, typer.Option("--record", help="A clip folder to record the frames into, whole or not at all.")
-    ] = None,
-    lock: Annotated[
-        str | None,
-        typer.Option(
-            "--lock",
-            help="Play the plan on a board and hold the dark row: edge, a row (300), or away from rows (200-500).",
-        ),
-    ] = None,
-    strobe: Annotated[str, typer.Option("--strobe", help="The board's port for --lock.")] = AUTO,
-    yes: Yes = False,
-    pace: Annotated[
-        Pace,
-        typer.Option("--pace", help="A clip's own pace, or fastest: once the strobe is found, every round is solved."),
-    ] = "own",
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.0, help="End after this many seconds of footage.")
-    ] = None,
-    no_page: Annotated[bool, typer.Option("--no-page", help="Serve no page.")] = False,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
-    port: Annotated[int | None, typer.Option(help="The page's port; left out: a free one.")] = None,
-    host: Annotated[
-        str, typer.Option(help="Address to serve the page at; at any but 127.0.0.1 the token is needed.")
-    ] = "127.0.0.1",
-    token: Annotated[
-        str | None, typer.Option(help="Secret word in the page's address for other machines; left out: generated.")
-    ] = None,
+    incoming: IncomingWords,
+    holding: HoldingWords,
+    playing: PaceWords,
+    served: LivePageWords,
     force: Force = False,
     voice: Voice,
 ) -> None:
@@ -101,20 +68,12 @@ def live(
             rig_out=rig_out,
             first_light=first_light,
             timing_out=timing_out,
-            growing=growing,
-            raw=raw,
-            record=record,
-            lock=lock,
-            strobe=strobe,
-            yes=yes,
-            pace=pace,
-            seconds=seconds,
+            **vars(incoming),
+            **vars(holding),
+            **vars(playing),
+            **served.parameters(),
             force=force,
-            page=not no_page,
-            host=host,
-            port=port,
-            token=token,
-            opened=lambda url: _open(voice, url, browser=not no_browser),
+            opened=lambda url: _open(voice, url, browser=not served.no_browser),
             said=lines.say,
             caller=voice.caller(),
         )

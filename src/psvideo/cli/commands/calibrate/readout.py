@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,6 +18,51 @@ if TYPE_CHECKING:
     from psvideo.calibrate.stripes.readout import Led, Readout
     from psvideo.calibrate.strobed_readout import StrobedReadout
     from psvideo.runs.calibrate.readout import MeasuredReadout
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StripeWords:
+    """How the stripes of an LED are read, as typed."""
+
+    rows: Annotated[
+        int | None, typer.Option(help="Rows of the whole frame, where the pictures are cropped.", min=2)
+    ] = None
+    zoom: Annotated[
+        float, typer.Option(help="Rows of the picture that show one row of the sensor.", min=0.01, max=100)
+    ] = 1.0
+    columns: Annotated[
+        str | None, typer.Option(help="Use only these columns, from the first to one past the last: 0-80.")
+    ] = None
+    near: Annotated[
+        str | None, typer.Option(help="Roughly the readout time (16ms), where stripes can be read in two ways.")
+    ] = None
+    fps: Annotated[
+        str | None,
+        typer.Option(
+            help="Frame rate at which it was filmed: 120, 119.88; left out: the movie's own.", rich_help_panel=CLIP
+        ),
+    ] = None
+
+    def parameters(self) -> dict[str, Any]:
+        """Return them as the library takes them."""
+        from psvideo.cli.options.typed import parse_columns, parse_positive_seconds, parse_rate
+
+        return {
+            "rows": self.rows,
+            "zoom": self.zoom,
+            "columns": None if self.columns is None else parse_columns(self.columns),
+            "near_s": None if self.near is None else parse_positive_seconds(self.near, option="--near"),
+            "fps": None if self.fps is None else parse_rate(self.fps),
+        }
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CameraLineWords:
+    """What the table of cameras calls the camera, as typed."""
+
+    make: Annotated[str, typer.Option(help="The camera's maker, for the table's line.")] = "MAKE"
+    model: Annotated[str, typer.Option(help="The camera's model, for the table's line.")] = "MODEL"
+    mode: Annotated[str, typer.Option(help="The camera's mode ('4K UHD 60p'), for the table's line.")] = "MODE"
 
 
 @spread
@@ -39,49 +84,23 @@ def readout(
             min=0,
         ),
     ] = None,
-    rows: Annotated[
-        int | None, typer.Option(help="Rows of the whole frame, where the pictures are cropped.", min=2)
-    ] = None,
-    zoom: Annotated[
-        float, typer.Option(help="Rows of the picture that show one row of the sensor.", min=0.01, max=100)
-    ] = 1.0,
-    columns: Annotated[
-        str | None, typer.Option(help="Use only these columns, from the first to one past the last: 0-80.")
-    ] = None,
-    near: Annotated[
-        str | None, typer.Option(help="Roughly the readout time (16ms), where stripes can be read in two ways.")
-    ] = None,
-    fps: Annotated[
-        str | None,
-        typer.Option(
-            help="Frame rate at which it was filmed: 120, 119.88; left out: the movie's own.", rich_help_panel=CLIP
-        ),
-    ] = None,
+    stripes: StripeWords,
     frames: Frames = None,
     plan: PlanPath = None,
-    make: Annotated[str, typer.Option(help="The camera's maker, for the table's line.")] = "MAKE",
-    model: Annotated[str, typer.Option(help="The camera's model, for the table's line.")] = "MODEL",
-    mode: Annotated[str, typer.Option(help="The camera's mode ('4K UHD 60p'), for the table's line.")] = "MODE",
+    camera: CameraLineWords,
     voice: Voice,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
-    from psvideo.cli.options.typed import parse_columns, parse_positive_seconds, parse_rate
     from psvideo.runs.calibrate.readout import readout as measure
 
     found = measure(
         pictures,
         led_hz=led_hz,
         led_tolerance_ppm=led_tolerance_ppm,
-        rows=rows,
-        zoom=zoom,
-        columns=None if columns is None else parse_columns(columns),
-        near_s=None if near is None else parse_positive_seconds(near, option="--near"),
-        fps=None if fps is None else parse_rate(fps),
+        **stripes.parameters(),
         frames=frames,
         plan=plan,
-        make=make,
-        model=model,
-        mode=mode,
+        **vars(camera),
         watch=voice.track,
         caller=voice.caller(),
     )
