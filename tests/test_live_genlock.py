@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +32,7 @@ from psvideo.live.following.holding import Holding, trim_by
 from psvideo.live.following.phase_filter import Measured, started
 from psvideo.live.following.trims import Trims
 from psvideo.model.plan import Plan
-from psvideo.runs.on_set.live_strobe import held_strobe
+from psvideo.runs.on_set.live_strobe import AskedLock, held_strobe
 from psvideo.runs.steps.caller import PYTHON
 from psvideo.strobe.as_played import as_played
 from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
@@ -47,6 +46,8 @@ from psvideo.sync.rowfit.beat import FoundClock, train_between
 PlanMaker = Callable[..., Plan]
 HOLDS_ROWS = 2.0
 UNO = BOARDS["atmega328p"]
+
+EMULATED_AT_EDGE = AskedLock(where="edge", port="emulated", warned=True)
 
 
 def held_plan(make_plan: PlanMaker, *, height_px: int = 72, readout: float = 0.9, fps: int = 50) -> Plan:
@@ -256,9 +257,7 @@ def test_a_pico_whose_program_takes_no_trims_yet_is_refused_before_it_flashes(
     port, path = PythonBoardPort(BOARDS["rp2040"]), tmp_path / "plan.toml"
     monkeypatch.setattr("psvideo.runs.strobe.port._open", lambda *_: port)
     path.write_text(format_plan(held_plan(make_plan)))
-    held = held_strobe(
-        Chain(plan=held_plan(make_plan)), path, lock="edge", port="emulated", yes=True, noted=print, caller=PYTHON
-    )
+    held = held_strobe(Chain(plan=held_plan(make_plan)), path, EMULATED_AT_EDGE, noted=print, caller=PYTHON)
     with pytest.raises(UsageError, match=r"pico-1.0, takes no trims yet. Copy the newer lights/pico/main.py"), held:
         pass
     assert port._controller.state == "idle"
@@ -295,8 +294,7 @@ def test_a_board_is_played_and_held_while_the_live_view_runs_and_dark_afterwards
     path.write_text(format_plan(held_plan(make_plan)))
     chain = Chain(plan=held_plan(make_plan))
     logs: list[RunLog] = []
-    given: dict[str, Any] = {"lock": "edge", "port": "emulated", "yes": True, "noted": notes.append, "caller": PYTHON}
-    with held_strobe(chain, path, **given, logged=logs.append) as holding:
+    with held_strobe(chain, path, EMULATED_AT_EDGE, noted=notes.append, caller=PYTHON, logged=logs.append) as holding:
         assert wait_until(lambda: port._controller.state == "running")
         assert (holding.ppm, holding.short_rows) == (0, None)
         assert holding._trimmed(-900)
@@ -317,14 +315,14 @@ def test_a_board_that_is_lost_is_a_sentence_and_not_the_end(
     path = tmp_path / "plan.toml"
     path.write_text(format_plan(held_plan(make_plan)))
     chain = Chain(plan=held_plan(make_plan))
-    with held_strobe(chain, path, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON) as holding:
+    with held_strobe(chain, path, EMULATED_AT_EDGE, noted=notes.append, caller=PYTHON) as holding:
         assert wait_until(lambda: port._controller.state == "running")
         port._controller.restart("power", port._now())
         assert wait_until(lambda: holding.ended)
     assert "restarted" in notes[0]
     with (
         pytest.raises(UsageError, match="name `plan`"),
-        held_strobe(chain, None, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON),
+        held_strobe(chain, None, EMULATED_AT_EDGE, noted=notes.append, caller=PYTHON),
     ):
         pass
 

@@ -29,7 +29,7 @@ from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.on_set.live_recorded import check_found, log_beside, recorded, said_what_is_recorded, timing_of
 from psvideo.runs.on_set.live_rehearsal import rehearse
-from psvideo.runs.on_set.live_strobe import held_strobe
+from psvideo.runs.on_set.live_strobe import AskedLock, held_strobe
 from psvideo.runs.on_set.live_viewed import PageAddress, check_gives_normals, rig_keeper, viewed
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.strobe.link.ports import AUTO
@@ -106,8 +106,6 @@ def live(
         held_strobe,
         running.chain,
         path_if_given("plan", plan) or played.plan_path,
-        port=strobe,
-        yes=yes,
         noted=running.notes.append,
         caller=caller,
         logged=partial(log_beside, running),
@@ -116,7 +114,7 @@ def live(
         said_what_is_recorded(running, record_path, caller),
         viewed(running, known, address, kept=kept, opened=opened, caller=caller) if page else nullcontext(),
         recorded(running, record_path, known, force=force),
-        nullcontext() if lock is None else held(lock=lock) as running.holding,
+        nullcontext() if lock is None else held(AskedLock(where=lock, port=strobe, warned=yes)) as running.holding,
     ):
         summary = running.run()
     if running.recording is not None:

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from psvideo.errors import PsvideoError, UsageError
@@ -23,19 +24,27 @@ from psvideo.strobe.runlog import RunLog, run_log
 from psvideo.strobe.session import Outcome, prepare, run_program
 
 
+@dataclass(frozen=True, kw_only=True)
+class AskedLock:
+    """``where`` the dark row is to stand ("edge", a row, or rows to keep free), by the board at a ``port``. ``warned``:
+    everybody in the room has been warned of the flashing."""
+
+    where: str
+    port: str
+    warned: bool
+
+
 @contextmanager
 def held_strobe(
     chain: Chain,
     plan_path: Path | None,
+    lock: AskedLock,
     *,
-    lock: str,
-    port: str,
-    yes: bool,
     noted: Callable[[str], None],
     caller: Caller,
     logged: Callable[[RunLog], None] = lambda log: None,
 ) -> Iterator[Holding]:
-    """Play the plan on the board at a port while the block runs, its dark row held where ``lock`` says.
+    """Play the plan on a board while the block runs, its dark row held where ``lock`` says.
 
     In every case the lights are dark afterwards, and ``logged`` gets the log of what was played. A board that is lost
     in the middle is a sentence for ``noted``, and the block goes on. Raises UsageError where the plan's dark row cannot
@@ -46,10 +55,10 @@ def held_strobe(
         raise UsageError("`lock` plays the plan on the board, and this source has no plan.toml beside it: name `plan`.")
     plan = read_plan(plan_path)
     check_holds(plan)
-    target = target_of(plan.camera, lock)
-    if port != EMULATED:
-        warn_of_flashing(plan, plan_path, warned=yes, confirm=None, caller=caller)
-    with opened_port(port) as opened:
+    target = target_of(plan.camera, lock.where)
+    if lock.port != EMULATED:
+        warn_of_flashing(plan, plan_path, warned=lock.warned, confirm=None, caller=caller)
+    with opened_port(lock.port) as opened:
         link = Link(opened)
         ready = prepare(link)
         _check_trims(ready.identity.firmware, opened.name)
