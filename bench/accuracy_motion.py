@@ -21,6 +21,7 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.synth.lamps.true_flashes import TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.stage import Stage, set_stage
@@ -79,7 +80,7 @@ class Filmed:
     def solved(self, one: Round) -> Surface:
         """Return a round's surface."""
         seen = np.stack([plate.pixels_seen for plate in one.plates])
-        return solve([plate.image for plate in one.plates], self.lit, seen=seen)
+        return solve(LitPlates([plate.image for plate in one.plates], self.lit, seen=seen))
 
     def truth(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the true normals at a time, and where the subject is."""

@@ -18,6 +18,7 @@ from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 
 SIZE, WIDTH_M, FAR_M = 128, 0.4, 1.6
 FOCAL_PX, MIDDLE = SIZE * FAR_M / WIDTH_M, (SIZE - 1) / 2
@@ -85,7 +86,9 @@ def _errors_deg(depth: Depth, widths: float) -> list[float]:
 
     def error_deg(plane_m: float | None, iterations: int = 0) -> float:
         if plane_m is None:
-            found = woodham1980.solve(plates, Illumination(directions=way, intensities=np.ones((3, 1))), mask=mask)
+            found = woodham1980.solve(
+                LitPlates(plates, Illumination(directions=way, intensities=np.ones((3, 1))), mask=mask)
+            )
         else:
             rig = Rig(
                 lights=tuple(lights),
@@ -99,7 +102,7 @@ def _errors_deg(depth: Depth, widths: float) -> list[float]:
             found = solve_near(
                 near,
                 lambda one: illumination(lights, channels=1, ground=one),
-                lambda lit: woodham1980.solve(plates, lit, mask=mask),
+                lambda lit: woodham1980.solve(LitPlates(plates, lit, mask=mask)),
             )
         both = found.valid & mask
         return float(angles_deg(found.normals[both], normals[both]).mean())

@@ -18,6 +18,7 @@ from bench.accuracy_measure import (
 )
 from bench.accuracy_robust import calibration
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 
 DIM = replace(huber1981.USABLE, dark_level=0.0005)  # DiLiGenT's 16-bit exposures are short
@@ -40,8 +41,8 @@ def rows() -> Iterator[Accuracy]:
 
 
 def _row(case: Case, name: str, bar_deg: float | None) -> Accuracy:
-    before = errors_deg(woodham1980.solve(case.plates, case.lit, usable=woodham1980.EVERYTHING), case)
-    after = errors_deg(huber1981.solve(case.plates, case.lit, usable=DIM), case)
+    before = errors_deg(woodham1980.solve(LitPlates(case.plates, case.lit), usable=woodham1980.EVERYTHING), case)
+    after = errors_deg(huber1981.solve(LitPlates(case.plates, case.lit), usable=DIM), case)
     bar = "better" if bar_deg is None else f"<= {bar_deg:g}°"
     met = bool(after.mean() <= (before.mean() if bar_deg is None else bar_deg))
     return Accuracy(name, described(before), "robust", described(after), bar, met)
@@ -52,8 +53,8 @@ def _subsets(case: Case, lights: int, count: int, bar_deg: float | None) -> Accu
     means = []
     for chosen in spread_subsets(case.lit.directions, lights, count):
         some = case.choose(chosen)
-        plain = woodham1980.solve(some.plates, some.lit, usable=woodham1980.EVERYTHING)
-        careful = huber1981.solve(some.plates, some.lit, usable=DIM)
+        plain = woodham1980.solve(LitPlates(some.plates, some.lit), usable=woodham1980.EVERYTHING)
+        careful = huber1981.solve(LitPlates(some.plates, some.lit), usable=DIM)
         means.append(
             (errors_deg(plain, some).mean(), errors_deg(careful, some).mean(), careful.valid[case.mask].mean())
         )

@@ -10,6 +10,7 @@ import numpy as np
 from bench.accuracy_l1 import l1_normals
 from bench.accuracy_measure import Accuracy, Case, angles_deg, described, errors_deg, gloss
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 
 CASES: tuple[tuple[str, tuple[int, ...], float, float], ...] = (
@@ -27,7 +28,8 @@ def rows() -> Iterator[Accuracy]:
     """Give every case, and the calibration of what is predicted."""
     cases = [(name, gloss(lights, scale=scale, noise=noise)) for name, lights, scale, noise in CASES]
     for name, case in cases:
-        plain, careful = woodham1980.solve(case.plates, case.lit), huber1981.solve(case.plates, case.lit)
+        given = LitPlates(case.plates, case.lit)
+        plain, careful = woodham1980.solve(given), huber1981.solve(given)
         both = plain.valid & careful.valid
         before, after = errors_deg(plain, case, both), errors_deg(careful, case, both)
         yield Accuracy(
@@ -40,7 +42,7 @@ def rows() -> Iterator[Accuracy]:
 
 def _beside_l1(case: Case) -> Accuracy:
     """Robust solving beside the exact minimum of absolute residuals over the same usable measurements."""
-    careful = huber1981.solve(case.plates, case.lit)
+    careful = huber1981.solve(LitPlates(case.plates, case.lit))
     chosen = np.flatnonzero((careful.valid & case.mask).ravel())
     chosen = np.random.default_rng(2).choice(chosen, L1_PIXELS, replace=False)
     truth = case.truth.reshape(-1, 3)[chosen]
@@ -58,7 +60,7 @@ def _beside_l1(case: Case) -> Accuracy:
 
 def calibration(name: str, case: Case) -> Accuracy:
     """Predicted standard error against the true error of the valid pixels."""
-    surface = huber1981.solve(case.plates, case.lit)
+    surface = huber1981.solve(LitPlates(case.plates, case.lit))
     where = surface.valid & case.mask
     assert surface.error_deg is not None
     predicted, true = surface.error_deg[where], errors_deg(surface, case)

@@ -11,8 +11,10 @@ import numpy as np
 
 from bench.accuracy_l1 import l1_normals
 from bench.accuracy_measure import Accuracy, Case, gloss
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 
 ROWS, COLS, REPEATS, L1_PIXELS, CORES = 1080, 1920, 7, 2000, 2
@@ -22,9 +24,10 @@ def rows() -> Iterator[Accuracy]:
     """Time solvers on the scene gloss.toml in grey, repeated to the size of a frame."""
     case = _grey_frame()
     codes = [(plate * 65535).astype(np.uint16) for plate in case.plates]
+    given, small = LitPlates(codes, case.lit, scale=1 / 65535), AskedSurface(half=True, residual=False)
     plain_s, careful_s, numpy_s = _best_of(
-        lambda: woodham1980.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
-        lambda: huber1981.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
+        lambda: woodham1980.solve(given, asked=small),
+        lambda: huber1981.solve(given, asked=small),
         lambda: _numpy(codes, case.lit.directions),
     )
     pixels = np.random.default_rng(0).choice(ROWS * COLS, L1_PIXELS, replace=False)
@@ -35,7 +38,7 @@ def rows() -> Iterator[Accuracy]:
         "<= 80 ms", careful_s <= 0.08,
     )  # fmt: skip
     began = time.process_time()
-    huber1981.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False, threads=1)
+    huber1981.solve(given, asked=small, threads=1)
     share_s = (time.process_time() - began) / CORES
     done = share_s <= 0.08
     yield Accuracy(f"robust, processor time / {CORES} cores", "", "", f"{1e3 * share_s:.0f} ms", "<= 80 ms", done)

@@ -25,6 +25,7 @@ from bench.accuracy_measure import (
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.synth import read_scene
 from psvideo.synth.stage import set_stage
@@ -103,7 +104,9 @@ def farthest(directions: np.ndarray, count: int) -> np.ndarray:
 def of_reached(case: Case, reached: np.ndarray) -> Iterator[Accuracy]:
     """What of the pixels that three lights reach is trusted, and how far off it is beside least squares."""
     surface = solved(case)
-    plain = woodham1980.solve(case.plates, case.lit, usable=woodham1980.Usable(dark_level=0.003, shadow_ratio=0))
+    plain = woodham1980.solve(
+        LitPlates(case.plates, case.lit), usable=woodham1980.Usable(dark_level=0.003, shadow_ratio=0)
+    )
     both = surface.valid & plain.valid & reached
     share = (surface.valid & reached).sum() / reached.sum()
     before, after = errors_deg(plain, case, both), errors_deg(surface, case, both)

@@ -17,9 +17,11 @@ from psvideo.compute.compiled import FUSED
 from psvideo.model.coded import Coded, Tone
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing.mixture import Mixture
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.kernel import solve_rows
 from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Usable, empty_result, task
 
@@ -78,7 +80,7 @@ def _round_rows() -> Iterator[Row]:
     targets = [np.empty_like(base) for _ in frames]
 
     def one_pass() -> None:
-        solve(plates, lit, usable=Usable(shadow_ratio=0.0), half=True, residual=False)
+        solve(LitPlates(plates, lit), asked=AskedSurface(half=True, residual=False), usable=Usable(shadow_ratio=0.0))
 
     def copy() -> None:
         for frame, target in zip(frames, targets, strict=True):
@@ -97,7 +99,7 @@ def _colour_rows() -> Iterator[Row]:
     rng = np.random.default_rng(0)
     plates = [0.3 + 0.3 * rng.random((ROWS, COLS, 3), dtype=np.float32) for _ in range(3)]
     lit = Illumination(directions=_ring(3), intensities=np.ones((3, 3)))
-    best_s = _best_of((lambda: solve(plates, lit, half=True, residual=False),))[0]
+    best_s = _best_of((lambda: solve(LitPlates(plates, lit), asked=AskedSurface(half=True, residual=False)),))[0]
     yield Row("3 lights, colour, float32 in: solve()", f"{1e3 * best_s:.1f} ms", "<= 25 ms", best_s <= 0.025)
 
 

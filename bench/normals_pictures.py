@@ -12,6 +12,7 @@ from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.on_screen import normal_colours, srgb
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 
 FULL_DEG = 10.0
@@ -21,7 +22,8 @@ GREY = 110
 def main() -> None:
     """Write the pictures; the ball's only where the real captures are."""
     case = gloss(noise=0.002)
-    plain, careful = woodham1980.solve(case.plates, case.lit), huber1981.solve(case.plates, case.lit)
+    given = LitPlates(case.plates, case.lit)
+    plain, careful = woodham1980.solve(given), huber1981.solve(given)
     above = [
         Tile("one of eight plates", srgb(case.plates[4], exposure=1.5)),
         Tile("least squares", normal_colours(plain.normals)),
@@ -37,9 +39,12 @@ def main() -> None:
 
 
 def _ball(case: Case, name: str) -> Strip:
-    plain = woodham1980.solve(case.plates, case.lit, usable=woodham1980.EVERYTHING)
+    plain = woodham1980.solve(LitPlates(case.plates, case.lit), usable=woodham1980.EVERYTHING)
     return _errors(
-        case, plain, huber1981.solve(case.plates, case.lit), f"Ball of DiLiGenT, {name}: errors, 0 to 10 degrees"
+        case,
+        plain,
+        huber1981.solve(LitPlates(case.plates, case.lit)),
+        f"Ball of DiLiGenT, {name}: errors, 0 to 10 degrees",
     )
 
 

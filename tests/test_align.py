@@ -36,6 +36,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.synth.truth import true_normals
 
@@ -124,8 +125,8 @@ def test_what_the_subject_hides_of_the_wall_is_right_or_not_valid() -> None:
         return Solving().solve([plate.image for plate in shown.plates], clip.lit, seen=seen(shown), unsure=shown.unsure)
 
     assert one.unsure is not None
-    explained = [plate.image for plate in one.plates], clip.lit
-    assert wrong(solve(*explained, seen=seen(one) & (one.unsure < UNKNOWN))) < 0.4 * wrong(clip.solved(clip.rounds[1]))
+    explained = LitPlates([plate.image for plate in one.plates], clip.lit, seen=seen(one) & (one.unsure < UNKNOWN))
+    assert wrong(solve(explained)) < 0.4 * wrong(clip.solved(clip.rounds[1]))
     trusted = judged(one)
     assert (trusted.valid & wall).sum() > (judged(clip.rounds[1]).valid & wall).sum()
     assert wrong(trusted) < 0.01

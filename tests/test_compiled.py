@@ -26,6 +26,7 @@ from psvideo.solve.filling import looking
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import kernel
 from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.loops import near_kernel
 from psvideo.solve.normals.robust import robust_kernel
 from psvideo.sync.rowfit.beat import Beat, FoundClock
@@ -420,5 +421,5 @@ def test_a_full_disk_under_the_cache_does_not_stop_a_solution(monkeypatch: pytes
     monkeypatch.setattr(numba.core.caching.IndexDataCacheFile, "save", full)
     directions = np.array([[0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])
     lit = Illumination(directions=directions, intensities=np.ones((3, 1)))
-    surface = solve([np.full((2, 2), 0.5, np.float32)] * 3, lit)
+    surface = solve(LitPlates([np.full((2, 2), 0.5, np.float32)] * 3, lit))
     assert surface.valid.all()

@@ -13,6 +13,7 @@ from psvideo.solve.filling.filled import filled
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
 
@@ -282,7 +283,7 @@ def test_where_little_is_missing_little_is_read_again() -> None:
     missing[50:60, 30:90] = True
     found = []
     for plates in (unmade, [one.image() for one in unmade]):
-        surface = woodham1980.solve(plates, lit_by(), usable=Usable())
+        surface = woodham1980.solve(LitPlates(plates, lit_by()), usable=Usable())
         for one in watched:
             one.read.clear()
         evidence = Evidence(plates=plates, lit=lit_by(), usable=Usable())

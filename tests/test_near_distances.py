@@ -14,6 +14,7 @@ from psvideo.model.surface import Misfit, Surface
 from psvideo.solve import near_surface
 from psvideo.solve.falloff_costs import falloff_costs
 from psvideo.solve.normals.illumination import illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.trust.judging import Judging
@@ -218,7 +219,9 @@ def test_the_error_of_a_far_wall_does_not_hang_on_what_stands_in_the_middle_of_t
         points = far.astype(float)[..., None] * rays(u, v)
         plates = filmed(rig, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
         ground = ground_of(rig, height_px=SIZE, width_px=SIZE).with_depth(depth_m)
-        found = huber1981.solve(plates, illumination(rig.lights, channels=1, ground=ground), plate_noise=noise)
+        found = huber1981.solve(
+            LitPlates(plates, illumination(rig.lights, channels=1, ground=ground)), plate_noise=noise
+        )
         assert found.error_deg is not None
         return float(np.median(found.error_deg[: SIZE // 4]))
 

@@ -32,6 +32,7 @@ from psvideo.solve.falloff_costs import around
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.loops.near_kernel import place_lights
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Near
@@ -59,7 +60,7 @@ def test_where_the_plane_is_the_surface_normals_and_albedo_are_exact(lights: int
     v, u = np.mgrid[:SIZE, :SIZE].astype(float)
     points = rays(u, v) * (-FAR_M / (rays(u, v) @ toward))[..., None]
     normals = np.broadcast_to(toward / np.linalg.norm(toward), points.shape)
-    found = solver.solve(filmed(tilted, points, normals), lit_by(tilted))
+    found = solver.solve(LitPlates(filmed(tilted, points, normals), lit_by(tilted)))
     assert found.valid.all()
     assert mean_error_deg(found, normals) < 2e-3
     np.testing.assert_allclose(found.albedo, 0.43, rtol=2e-4)
@@ -78,11 +79,11 @@ def test_directions_from_the_plane_undo_what_taking_lights_for_distant_costs(
     rig = ring_rig(3, widths)
     plates, near = filmed(rig, points, normals), lit_by(rig)
     distant = Illumination(directions=near.directions, intensities=near.intensities)
-    assert mean_error_deg(woodham1980.solve(plates, distant), normals) > distant_deg
-    assert mean_error_deg(woodham1980.solve(plates, near), normals) < near_deg
+    assert mean_error_deg(woodham1980.solve(LitPlates(plates, distant)), normals) > distant_deg
+    assert mean_error_deg(woodham1980.solve(LitPlates(plates, near)), normals) < near_deg
     for share in (0.9, 1.1):
         off = lit_by(ring_rig(3, widths, plane_m=share * FAR_M))
-        assert mean_error_deg(woodham1980.solve(plates, off), normals) < off_deg
+        assert mean_error_deg(woodham1980.solve(LitPlates(plates, off)), normals) < off_deg
 
 
 @pytest.mark.parametrize("widths", [2, 3])
@@ -100,7 +101,7 @@ def test_alternating_with_integrated_depth_takes_off_what_a_plane_cannot_know(
         found = solve_near(
             near,
             lambda ground: illumination(rig.lights, channels=1, ground=ground),
-            lambda lit: woodham1980.solve(plates, lit, mask=inside),
+            lambda lit: woodham1980.solve(LitPlates(plates, lit, mask=inside)),
         )
         return mean_error_deg(found, normals, inside)
 
@@ -118,7 +119,7 @@ def test_distant_lights_may_stand_among_near_ones_and_a_far_light_is_a_distant_o
         lights=(*near.lights, Light(name="sun", direction=(0.3, 0.5, np.sqrt(1 - 0.34)), intensity=(0.8,))),
         focal_px=near.focal_px, principal_px=near.principal_px, plane=near.plane,
     )  # fmt: skip
-    assert mean_error_deg(woodham1980.solve(filmed(mixed, points, normals), lit_by(mixed)), normals) < 0.2
+    assert mean_error_deg(woodham1980.solve(LitPlates(filmed(mixed, points, normals), lit_by(mixed))), normals) < 0.2
     far = Rig(
         lights=tuple(
             Light(name=light.name, position_m=tuple(45 * np.array(way)), intensity=(45.0**2,))
@@ -130,7 +131,7 @@ def test_distant_lights_may_stand_among_near_ones_and_a_far_light_is_a_distant_o
         [Light(name=str(n), direction=tuple(way)) for n, way in enumerate(lit_by(far).directions)], channels=1
     )
     plates = filmed(far, points, normals)
-    one, other = woodham1980.solve(plates, lit_by(far)), woodham1980.solve(plates, distant)
+    one, other = woodham1980.solve(LitPlates(plates, lit_by(far))), woodham1980.solve(LitPlates(plates, distant))
     assert np.abs(one.normals - other.normals).max() < 0.02
     assert (one.valid == other.valid).all()
 

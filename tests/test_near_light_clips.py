@@ -16,6 +16,7 @@ from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 
 
@@ -49,9 +50,9 @@ def test_a_real_rig_of_leds_with_axes_and_unequal_strengths(shared_data: Path) -
     plates, near = filmed(rig, points, normals), lit_by(rig, channels=3)
     assert max(plate.max() for plate in plates) < 1
     distant = Illumination(directions=near.directions, intensities=near.intensities)
-    before = mean_error_deg(woodham1980.solve(plates, distant), normals)
+    before = mean_error_deg(woodham1980.solve(LitPlates(plates, distant)), normals)
     for solver in (woodham1980, huber1981):
-        assert mean_error_deg(solver.solve(plates, near), normals) < min(0.6, 0.1 * before)
+        assert mean_error_deg(solver.solve(LitPlates(plates, near)), normals) < min(0.6, 0.1 * before)
 
 
 @pytest.mark.parametrize("mu", [0.5, 1.0, 2.5])
@@ -74,7 +75,7 @@ def test_an_led_without_an_axis_shines_at_the_surface_s_middle(mu: float) -> Non
         unaimed.append(Light(**common))
     view: dict[str, Any] = {"focal_px": bare.focal_px, "principal_px": bare.principal_px, "plane": bare.plane}
     found = woodham1980.solve(
-        filmed(Rig(lights=tuple(aimed), **view), points, normals), lit_by(Rig(lights=tuple(unaimed), **view))
+        LitPlates(filmed(Rig(lights=tuple(aimed), **view), points, normals), lit_by(Rig(lights=tuple(unaimed), **view)))
     )
     assert mean_error_deg(found, normals) < 0.25
 

@@ -10,8 +10,10 @@ from ring_and_ball import ball, ring
 from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
 from psvideo.model.surface import Surface
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.illumination import MAX_CONDITION, Illumination, illumination
 from psvideo.solve.normals.least_squares.woodham1980 import EVERYTHING, Usable, solve
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.task import PIXEL_CONDITION
 
 Array = NDArray[np.float64]
@@ -50,7 +52,7 @@ def test_a_matte_ball_comes_out_exactly(lights: int, channels: int) -> None:
     strengths = np.random.default_rng(lights).uniform(0.4, 1.2, (lights, channels))
     lit = lit_by(ring(lights, 40), strengths)
     albedo = np.array([0.7, 0.3, 0.05])[:channels]
-    surface = solve(list(shoot(normals, lit, albedo if channels == 3 else 0.7)), lit)
+    surface = solve(LitPlates(list(shoot(normals, lit, albedo if channels == 3 else 0.7)), lit))
     assert error_deg(surface, normals).max() < 1e-3
     truth = np.broadcast_to(albedo if channels == 3 else albedo[0], surface.albedo.shape)
     np.testing.assert_allclose(surface.albedo[surface.valid], truth[surface.valid], rtol=2e-5)
@@ -62,7 +64,7 @@ def test_a_matte_ball_comes_out_exactly(lights: int, channels: int) -> None:
 def test_with_three_lights_a_normal_is_valid_exactly_where_no_light_is_in_shadow() -> None:
     normals, inside = ball(reach_deg=90)
     lit = lit_by(ring(3, 40))
-    surface = solve(list(shoot(normals, lit, 0.8)), lit)
+    surface = solve(LitPlates(list(shoot(normals, lit, 0.8)), lit))
     shade = np.einsum("rcx,lx->lrc", normals, lit.directions)
     assert not surface.valid[(shade <= 0.003).any(axis=0)].any()
     assert surface.valid[inside & (shade >= 0.12).all(axis=0)].all()
@@ -75,10 +77,10 @@ def test_with_eight_lights_shadows_cost_neither_coverage_nor_accuracy() -> None:
     normals, inside = ball(reach_deg=90)
     lit = lit_by(ring(8, 40))
     plates = list(shoot(normals, lit, 0.8))
-    surface = solve(plates, lit)
+    surface = solve(LitPlates(plates, lit))
     assert surface.valid[inside].mean() > 0.99
     assert error_deg(surface, normals).max() < 1e-3
-    assert error_deg(solve(plates, lit, usable=EVERYTHING), normals, inside).mean() > 1
+    assert error_deg(solve(LitPlates(plates, lit), usable=EVERYTHING), normals, inside).mean() > 1
 
 
 NOISE, DIRECTION_1, DIRECTION_5 = "1 % noise", "directions off by 1°", "directions off by 5°"
@@ -121,7 +123,7 @@ def _solve_with(fault: str, normals: Array, directions: Array, rng: np.random.Ge
         plates = np.where(plates <= 0.0031308, 12.92 * plates, 1.055 * np.maximum(plates, 1e-9) ** (1 / 2.4) - 0.055)
     else:
         plates = plates + (0.01 if "1 %" in fault else 0.04)
-    return solve(list(plates.astype(np.float32)), believed)
+    return solve(LitPlates(list(plates.astype(np.float32)), believed))
 
 
 def _turned(directions: Array, angle_deg: float, rng: np.random.Generator) -> Array:
@@ -137,18 +139,20 @@ def test_a_channel_in_which_the_surface_is_black_adds_no_noise() -> None:
     noise = np.random.default_rng(1).normal(0, 0.01, (3, *inside.shape, 3)).astype(np.float32)
     coloured = lit_by(ring(3, 40), channels=3)
     red = shoot(normals, coloured, np.array([0.6, 0.0, 0.0])) + noise
-    together = error_deg(solve(list(red), coloured), normals, inside).mean()
-    alone = error_deg(solve(list(red[..., 0].copy()), lit_by(ring(3, 40))), normals, inside).mean()
+    together = error_deg(solve(LitPlates(list(red), coloured)), normals, inside).mean()
+    alone = error_deg(solve(LitPlates(list(red[..., 0].copy()), lit_by(ring(3, 40)))), normals, inside).mean()
     assert together == pytest.approx(alone, rel=0.1)
     white = shoot(normals, coloured, np.array([0.6, 0.6, 0.6])) + noise
-    assert error_deg(solve(list(white), coloured), normals, inside).mean() == pytest.approx(alone / 3**0.5, rel=0.05)
+    assert error_deg(solve(LitPlates(list(white), coloured)), normals, inside).mean() == pytest.approx(
+        alone / 3**0.5, rel=0.05
+    )
 
 
 def test_albedo_keeps_one_scale_for_any_picture() -> None:
     normals, _ = ball(48, reach_deg=90)
     lit = lit_by(ring(4, 40), np.full((4, 1), 0.5))
-    dim = solve(list(shoot(normals, lit, 0.1)), lit)
-    bright = solve(list(shoot(normals, lit, 0.9)), lit)
+    dim = solve(LitPlates(list(shoot(normals, lit, 0.1)), lit))
+    bright = solve(LitPlates(list(shoot(normals, lit, 0.9)), lit))
     assert np.median(dim.albedo[dim.valid]) == pytest.approx(0.1, rel=1e-4)
     assert np.median(bright.albedo[bright.valid]) == pytest.approx(0.9, rel=1e-4)
 
@@ -157,7 +161,7 @@ def test_the_residual_is_what_the_fit_leaves_in_units_of_saturation() -> None:
     normals, inside = ball(reach_deg=40)
     lit = lit_by(ring(8, 40), np.full((8, 1), 0.7))
     noise = np.random.default_rng(2).normal(0, 0.01, (8, *inside.shape))
-    surface = solve(list((shoot(normals, lit, 0.9) + noise).astype(np.float32)), lit)
+    surface = solve(LitPlates(list((shoot(normals, lit, 0.9) + noise).astype(np.float32)), lit))
     assert surface.residual is not None
     rms = np.sqrt(np.mean(surface.residual[inside] ** 2))
     assert rms == pytest.approx(0.01 * np.sqrt(5 / 8), rel=0.03)  # three of eight degrees of freedom are fitted
@@ -211,7 +215,7 @@ def test_every_pixel_is_the_least_squares_solution_of_its_usable_measurements(
     plates[rng.random(plates.shape[:3]) < 0.15] = 0.001
     plates[rng.random(plates.shape) < 0.02] = rng.choice([np.nan, np.inf, -np.inf])
     seen = rng.random((lights, 3) if rows_only else (lights, 3, 5)) < 0.95
-    found = solve(list(plates if coloured else plates[..., 0]), lit, seen=seen)
+    found = solve(LitPlates(list(plates if coloured else plates[..., 0]), lit, seen=seen))
     for row, col in np.ndindex(3, 5):
         here = seen[:, row] if rows_only else seen[:, row, col]
         expected = _reference(plates[:, row, col].astype(np.float64), lit, here)
@@ -291,14 +295,14 @@ def test_neither_threads_nor_neighbours_change_a_pixel(channels: int) -> None:
     plates = rng.uniform(0.1, 0.8, (5, 150, 1001, channels)).astype(np.float32)  # rows of blocks, and a rest
     if channels == 1:
         plates = plates[..., 0]
-    one = solve(list(plates), lit, threads=1)
+    one = solve(LitPlates(list(plates), lit), threads=1)
     for threads in (2, 3):
-        several = solve(list(plates), lit, threads=threads)
+        several = solve(LitPlates(list(plates), lit), threads=threads)
         for name in ("normals", "albedo", "valid", "residual"):
             np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
     shadowed = plates.copy()
     shadowed[0, :, ::97] = 0  # sends every block down the path for pixels with unusable measurements
-    other = solve(list(shadowed), lit)
+    other = solve(LitPlates(list(shadowed), lit))
     untouched = np.arange(1001) % 97 != 0
     np.testing.assert_allclose(other.normals[:, untouched], one.normals[:, untouched], atol=2e-6)
 
@@ -311,7 +315,7 @@ def test_pixels_whose_measurements_are_all_usable_come_out_as_the_general_rule_s
         plates = rng.uniform(0.3, 0.7, (lights, 6, 100, 3)).astype(np.float32)
         seen = np.ones((lights, 6, 100), np.bool_)
         seen[0, :, 0] = False
-        quick, general = (solve(list(plates), lit, seen=one) for one in (None, seen))
+        quick, general = (solve(LitPlates(list(plates), lit, seen=one)) for one in (None, seen))
         assert (quick.valid == general.valid)[:, 1:].all()
         assert np.abs(quick.normals - general.normals)[:, 1:].max() < 1e-5
         for name in ("albedo", "residual"):
@@ -328,11 +332,11 @@ def test_codes_with_a_black_level_and_half_floats_give_the_same_surface(kind: st
     lit = lit_by(ring(8, 40))
     codes = np.round(shoot(normals, lit, 0.8) * 3839 + 256).astype(np.uint16)
     plates = [((plate - 256.0) / 3839).astype(np.float32) for plate in codes]
-    plain = solve(plates, lit)
+    plain = solve(LitPlates(plates, lit))
     if kind == "codes":
-        other = solve(list(codes), lit, black_level=256, scale=1 / 3839)
+        other = solve(LitPlates(list(codes), lit, black_level=256, scale=1 / 3839))
     else:
-        other = solve(plates, lit, half=True)
+        other = solve(LitPlates(plates, lit), asked=AskedSurface(half=True))
         assert other.normals.dtype == other.albedo.dtype == np.float16
         assert other.normals[..., 0].flags.c_contiguous
     np.testing.assert_array_equal(other.valid, plain.valid)
@@ -343,7 +347,7 @@ def test_codes_with_a_black_level_and_half_floats_give_the_same_surface(kind: st
 
 def test_an_albedo_beyond_half_floats_becomes_the_largest_of_them() -> None:
     lit = lit_by(ring(3, 40), np.full((3, 1), 1e-6))
-    surface = solve(list(np.full((3, 2, 2), 0.5, np.float32)), lit, half=True)
+    surface = solve(LitPlates(list(np.full((3, 2, 2), 0.5, np.float32)), lit), asked=AskedSurface(half=True))
     np.testing.assert_array_equal(surface.albedo, np.float16(65504))
 
 
@@ -353,10 +357,10 @@ def test_a_saturated_measurement_is_left_out_in_all_channels() -> None:
     plates = shoot(normals, lit, np.array([0.5, 0.4, 0.3]))
     plates[2, ..., 0] = 1.0  # one channel burnt out; the other two are fine but belong to it
     plates[2, ..., 1:] *= 0.5
-    surface = solve(list(plates), lit)
+    surface = solve(LitPlates(list(plates), lit))
     assert surface.valid[inside].all()
     assert error_deg(surface, normals, inside).max() < 1e-3
-    three = solve(list(plates[:3]), lit_by(ring(4, 30)[:3], channels=3))
+    three = solve(LitPlates(list(plates[:3]), lit_by(ring(4, 30)[:3], channels=3)))
     assert not three.valid.any()
 
 
@@ -370,8 +374,8 @@ def test_only_the_masked_pixels_and_the_rows_that_were_seen_are_solved() -> None
     seen[1, 30:35] = False
     lost = np.zeros((64, 64), np.bool_)
     lost[30:35] = True
-    everywhere = solve(plates, lit).valid
-    np.testing.assert_array_equal(solve(plates, lit, mask=mask, seen=seen).valid, everywhere & mask & ~lost)
+    everywhere = solve(LitPlates(plates, lit)).valid
+    np.testing.assert_array_equal(solve(LitPlates(plates, lit, mask=mask, seen=seen)).valid, everywhere & mask & ~lost)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -380,7 +384,7 @@ def test_what_is_no_number_goes_in_and_never_comes_out(value: float) -> None:
     plates = np.full((4, 3, 700), 0.5, np.float32)
     plates[1, 1, 600] = value
     plates[:, 2] = value
-    surface = solve(list(plates), lit)
+    surface = solve(LitPlates(list(plates), lit))
     assert surface.residual is not None
     for array in (surface.normals, surface.albedo, surface.residual):
         assert np.isfinite(array).all()
@@ -405,7 +409,7 @@ def test_arrays_that_do_not_belong_together_are_a_mistake_of_the_program(change:
     arguments = {"plates": [np.zeros((2, 2), np.float32)] * 3} | change
     plates = arguments.pop("plates")
     with pytest.raises(ValueError, match=r"plates|seen|mask"):
-        solve(plates, lit_by(ring(3, 40)), **arguments)  # type: ignore[arg-type]
+        solve(LitPlates(plates, lit_by(ring(3, 40)), **arguments))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("tilt_deg", "kept"), [(-80.0, True), (-95.0, True), (-105.0, True), (-120.0, False)])
@@ -416,7 +420,7 @@ def test_a_table_top_seen_in_perspective_may_turn_a_little_away_from_the_axis(ti
     lights = np.array([[0.3, 0.95, 0.1], [-0.3, 0.95, 0.1], [0.0, 0.8, 0.6], [0.0, 0.9, -0.3]])
     lights /= np.linalg.norm(lights, axis=1, keepdims=True)
     lit = Illumination(directions=lights, intensities=np.ones((4, 1)))
-    solved = solve([np.full((2, 2), 0.7 * max(normal @ light, 0), np.float32) for light in lights], lit)
+    solved = solve(LitPlates([np.full((2, 2), 0.7 * max(normal @ light, 0), np.float32) for light in lights], lit))
     assert solved.valid.all() == kept
     if kept:
         np.testing.assert_allclose(solved.normals[0, 0], normal, atol=1e-5)

@@ -15,6 +15,7 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import EVERYTHING, Usable, solve
+from psvideo.solve.normals.lit_plates import LitPlates
 
 
 def error_deg(surface: Surface, truth: NDArray[np.floating], mask: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -36,10 +37,10 @@ def test_the_ball_of_diligent_with_48_lights(shared_data: Path) -> None:
     mask = read_picture(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
     truth = np.load(folder / "normal_gt.npy")
 
-    plain = solve(plates, lit, usable=EVERYTHING)
+    plain = solve(LitPlates(plates, lit), usable=EVERYTHING)
     assert plain.valid[mask].all()
     assert error_deg(plain, truth, mask).mean() <= 4.2  # published for all 96 lights: 4.10
-    careful = solve(plates, lit, mask=mask, usable=Usable(dark_level=0.0005))
+    careful = solve(LitPlates(plates, lit, mask=mask), usable=Usable(dark_level=0.0005))
     assert careful.valid[mask].mean() > 0.99
     assert error_deg(careful, truth, mask).mean() <= 3.3
 
@@ -48,10 +49,10 @@ def test_the_rendered_bunny_with_cast_shadows(shared_data: Path) -> None:
     data = np.load(shared_data / "bunny_rendered" / "bunny_lambert.npz")
     plates = list(data["images"].astype(np.float32) * 5)
     lit = Illumination(directions=data["lights"].astype(np.float64), intensities=np.ones((len(plates), 3)))
-    plain = error_deg(solve(plates, lit, usable=EVERYTHING), data["normal_gt"], data["mask"])
+    plain = error_deg(solve(LitPlates(plates, lit), usable=EVERYTHING), data["normal_gt"], data["mask"])
     assert plain.mean() == pytest.approx(4.11, abs=0.03)
     assert np.median(plain) == pytest.approx(3.51, abs=0.03)
-    careful = solve(plates, lit)
+    careful = solve(LitPlates(plates, lit))
     assert careful.valid[data["mask"]].mean() > 0.999
     assert error_deg(careful, data["normal_gt"], data["mask"]).mean() < 4.0
     assert np.percentile(error_deg(careful, data["normal_gt"], data["mask"]), 95) < 6.5 < np.percentile(plain, 95)
@@ -69,8 +70,10 @@ def test_the_matte_sphere_of_washington(shared_data: Path) -> None:
     x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
     inner = x * x + y * y < 0.95**2
     truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
-    assert error_deg(solve(plates, lit, usable=EVERYTHING), truth, inner).mean() == pytest.approx(5.1, abs=0.1)
-    assert error_deg(solve(plates, lit), truth, inner).mean() < 4.9
+    assert error_deg(solve(LitPlates(plates, lit), usable=EVERYTHING), truth, inner).mean() == pytest.approx(
+        5.1, abs=0.1
+    )
+    assert error_deg(solve(LitPlates(plates, lit)), truth, inner).mean() < 4.9
 
 
 @pytest.mark.parametrize("clip", ["plain", "ambient"])
@@ -90,7 +93,7 @@ def test_the_true_plates_of_another_simulator_give_its_true_normals(shared_data:
             [np.broadcast_to(light.intensity, channels) * factor for light, factor in zip(lights, scale, strict=True)]
         ),
     )
-    surface = solve(plates, lit)
+    surface = solve(LitPlates(plates, lit))
     normals, mask = _exr(truth / "normals.exr"), _exr(truth / "mask.exr")[..., 0] > 0.5
     errors = error_deg(surface, normals, mask)
     assert np.median(errors) < 0.1

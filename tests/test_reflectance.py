@@ -213,13 +213,13 @@ def test_through_a_lens_a_pixel_is_solved_alike_whatever_is_beside_it_and_by_any
     plates = shot(normals, sent, gloss=0.3, to_camera=to_camera)
     lit = replace(under(WAYS), view=BESIDE_THE_AXIS)
     noise = PlateNoise(read=1e-6, photon=0.0)
-    whole = huber1981.solve(plates, lit, plate_noise=noise, threads=1)
+    whole = huber1981.solve(LitPlates(plates, lit), plate_noise=noise, threads=1)
     assert whole.misfit is not None
     assert whole.misfit.reflectance is not None
-    again = huber1981.solve(plates, lit, plate_noise=noise, threads=4)
+    again = huber1981.solve(LitPlates(plates, lit), plate_noise=noise, threads=4)
     few = np.zeros((SIZE, SIZE), np.bool_)
     few[::3, ::5] = True
-    apart = huber1981.solve(plates, lit, plate_noise=noise, mask=few, misfit=whole.misfit)
+    apart = huber1981.solve(LitPlates(plates, lit, mask=few), plate_noise=noise, misfit=whole.misfit)
     np.testing.assert_array_equal(again.normals, whole.normals)
     np.testing.assert_allclose(apart.normals[few], whole.normals[few], atol=2e-5)
 
@@ -380,5 +380,5 @@ def seen_in(plates: list[NDArray[np.float32]], lit: Illumination) -> Reflectance
         albedo=np.full((SIZE, SIZE, 3), 0.5, np.float32),
         valid=np.ones((SIZE, SIZE), bool),
     )
-    points = points_of(plates, lit, found, Usable(dark_level=0.003), step=1, seen=None, black_level=0.0, scale=1.0)
+    points = points_of(LitPlates(plates, lit), found, Usable(dark_level=0.003), step=1)
     return None if points is None else reflectance_of([points])

@@ -19,8 +19,10 @@ from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.solve.depth import View
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.huber1981 import solve
@@ -81,7 +83,7 @@ def test_a_matte_ball_comes_out_exactly(lights: int, channels: int, loss: str) -
     lit = lit_by(ring(lights, 40), channels=channels)
     albedo = np.array([0.7, 0.3, 0.05])[:channels]
     plates = shoot(normals, lit, albedo if channels == 3 else 0.7)
-    surface = solve(plates, lit, reweighting=Reweighting(loss=loss))  # type: ignore[arg-type]
+    surface = solve(LitPlates(plates, lit), reweighting=Reweighting(loss=loss))  # type: ignore[arg-type]
     assert error_deg(surface, normals).max() < 1e-3
     np.testing.assert_allclose(surface.albedo[surface.valid].reshape(-1, channels)[:, 0], 0.7, rtol=1e-4)
     assert surface.residual is not None
@@ -98,8 +100,8 @@ def test_one_normal_from_three_channels_of_any_colours() -> None:
     shiny = [
         np.minimum(plate + gleam[..., None], 1).astype(np.float32) for plate, gleam in zip(red, highlight, strict=True)
     ]
-    assert error_deg(solve(shiny, lit), normals, inside).mean() < 0.7
-    assert error_deg(woodham1980.solve(shiny, lit), normals, inside).mean() > 3
+    assert error_deg(solve(LitPlates(shiny, lit)), normals, inside).mean() < 0.7
+    assert error_deg(woodham1980.solve(LitPlates(shiny, lit)), normals, inside).mean() > 3
 
 
 def _halves(directions: Array) -> Array:
@@ -113,8 +115,8 @@ def test_noise_on_a_matte_surface_costs_at_most_a_third_more_than_least_squares(
     lit = lit_by(ring(8, 35))
     rng = np.random.default_rng(2)
     plates = [(plate + rng.normal(0, 0.005, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
-    plain = error_deg(woodham1980.solve(plates, lit), normals, inside).mean()
-    assert error_deg(solve(plates, lit), normals, inside).mean() < 1.33 * plain
+    plain = error_deg(woodham1980.solve(LitPlates(plates, lit)), normals, inside).mean()
+    assert error_deg(solve(LitPlates(plates, lit)), normals, inside).mean() < 1.33 * plain
 
 
 def l1_normals(measured: Array, usable: NDArray[np.bool_], directions: Array) -> Array:
@@ -143,7 +145,7 @@ def test_gloss_and_cast_shadows_come_out_as_well_as_by_least_absolute_residuals(
     gloss: tuple[Plates, Illumination, Array],
 ) -> None:
     plates, lit, truth = gloss
-    surface = solve(plates, lit, reweighting=TRUST_ALL)
+    surface = solve(LitPlates(plates, lit), reweighting=TRUST_ALL)
     chosen = np.flatnonzero(surface.valid.ravel())
     chosen = np.random.default_rng(4).choice(chosen, 6000, replace=False)
     samples = np.array([plate.reshape(-1, 3)[chosen] for plate in plates], np.float64) / 0.8
@@ -161,7 +163,7 @@ def test_gloss_and_cast_shadows_come_out_as_well_as_by_least_absolute_residuals(
     ours = angles_deg(surface.normals.reshape(-1, 3)[chosen], truth.reshape(-1, 3)[chosen])
     assert ours.mean() <= expected.mean()
     assert np.quantile(ours, 0.99) <= np.quantile(expected, 0.99)
-    plain = error_deg(woodham1980.solve(plates, lit), truth).mean()
+    plain = error_deg(woodham1980.solve(LitPlates(plates, lit)), truth).mean()
     assert ours.mean() < 0.3 * plain
 
 
@@ -175,7 +177,7 @@ def test_the_predicted_error_covers_the_true_one(
     rng = np.random.default_rng(3)
     noisy = [(plates[n] + rng.normal(0, noise, plates[n].shape)).astype(np.float32) for n in lights]
     some = Illumination(directions=lit.directions[list(lights)], intensities=lit.intensities[list(lights)])
-    surface = solve(noisy, some)
+    surface = solve(LitPlates(noisy, some))
     assert surface.error_deg is not None
     true, predicted = error_deg(surface, truth), surface.error_deg[surface.valid]
     assert surface.misfit is not None
@@ -183,7 +185,7 @@ def test_the_predicted_error_covers_the_true_one(
     assert np.mean(true <= predicted) >= 0.63  # a Rayleigh distribution's share
     assert np.mean(true <= 2 * predicted) >= 0.95
     assert np.mean(true <= 10) >= 0.98
-    doubted = solve(noisy, some, reweighting=TRUST_ALL)
+    doubted = solve(LitPlates(noisy, some), reweighting=TRUST_ALL)
     left_out = doubted.valid & ~surface.valid
     assert error_deg(doubted, truth, left_out).mean() > 1.5 * true.mean()
     assert surface.valid.mean() > 0.85
@@ -207,7 +209,7 @@ def test_a_rig_that_is_wrong_is_no_single_pixels_fault() -> None:
     lit = two_rings()
     rng = np.random.default_rng(6)
     plates = [(plate + rng.normal(0, 0.002, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
-    right, wrong = solve(plates, lit), solve(plates, turned(lit, 5))
+    right, wrong = solve(LitPlates(plates, lit)), solve(LitPlates(plates, turned(lit, 5)))
     assert right.misfit is not None
     assert wrong.misfit is not None
     assert wrong.misfit.share > 2 * right.misfit.share
@@ -215,7 +217,7 @@ def test_a_rig_that_is_wrong_is_no_single_pixels_fault() -> None:
     assert right.valid[inside].mean() > 0.99
     assert wrong.valid[inside].mean() > 0.95
     assert np.mean(error_deg(wrong, normals) < 10) > 0.97
-    beside_others = solve(plates, turned(lit, 5), misfit=right.misfit)
+    beside_others = solve(LitPlates(plates, turned(lit, 5)), misfit=right.misfit)
     assert beside_others.valid[inside].mean() < 0.8  # what a picture of which all else fits would say of these pixels
 
 
@@ -230,8 +232,8 @@ def test_normals_that_sheen_turns_are_mostly_called_invalid() -> None:
         (plate + 0.6 * sheen + rng.normal(0, 0.002, plate.shape)).astype(np.float32)
         for plate, sheen in zip(shoot(normals, lit, 0.3), lobe, strict=True)
     ]
-    surface = solve(plates, lit)
-    everything = solve(plates, lit, reweighting=TRUST_ALL)
+    surface = solve(LitPlates(plates, lit))
+    everything = solve(LitPlates(plates, lit), reweighting=TRUST_ALL)
     far = angles_deg(np.where(everything.valid[..., None], everything.normals, [0, 0, 1]), normals) > 10
     valid, invalid = surface.valid & inside, everything.valid & inside & ~surface.valid
     assert far[valid].mean() < 0.03
@@ -255,7 +257,7 @@ def test_what_was_not_followed_does_not_spoil_what_stands_around_it() -> None:
     rest = np.s_[:, 2 * cols // 3 + cols // 8 :]
     noise = PlateNoise(read=4e-6, photon=0.0)
     alone, beside, blamed = (
-        solve(images, lit, plate_noise=noise, unsure=given)
+        solve(LitPlates(images, lit, unsure=given), plate_noise=noise)
         for images, given in ((plates, None), (passed, unsure), (passed, None))
     )
     typical = list[float]()
@@ -278,7 +280,7 @@ def test_what_moves_is_typical_of_a_picture_only_where_it_fits_better_than_what_
     passed = [np.where(moves, np.roll(plate, 5 * n, axis=1), plate) for n, plate in enumerate(plates)]
     unsure, noise = np.zeros((5, *plates[0].shape), np.float32), PlateNoise(read=4e-6, photon=0.0)
     alone, beside, blamed, otherwise = (
-        solve(images, lit, plate_noise=noise, unsure=unsure, moves=given).misfit
+        solve(LitPlates(images, lit, unsure=unsure, moves=given), plate_noise=noise).misfit
         for images, given in ((plates, None), (passed, moves), (passed, None), (passed, ~moves))
     )
     assert alone is not None
@@ -292,8 +294,8 @@ def test_what_moves_is_typical_of_a_picture_only_where_it_fits_better_than_what_
 def test_where_nothing_can_contradict_no_misfit_is_claimed() -> None:
     normals, _ = ball(48, reach_deg=30)
     lit = lit_by(ring(3, 35))
-    assert solve(shoot(normals, lit), lit).misfit is None
-    assert solve([np.zeros((8, 8), np.float32)] * 6, lit_by(ring(6, 35))).misfit is None
+    assert solve(LitPlates(shoot(normals, lit), lit)).misfit is None
+    assert solve(LitPlates([np.zeros((8, 8), np.float32)] * 6, lit_by(ring(6, 35)))).misfit is None
 
 
 def test_the_report_says_what_no_pixel_is_blamed_for() -> None:
@@ -316,7 +318,7 @@ def test_the_predicted_error_grows_with_the_noise() -> None:
     ratios = []
     for noise in (0.01, 0.02, 0.04):
         plates = [(plate + rng.normal(0, noise, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
-        surface = solve(plates, lit, reweighting=TRUST_ALL)
+        surface = solve(LitPlates(plates, lit), reweighting=TRUST_ALL)
         assert surface.error_deg is not None
         true = np.sqrt(np.mean(error_deg(surface, normals, inside) ** 2))
         ratios.append(np.sqrt(np.mean(surface.error_deg[inside] ** 2.0)) / true)
@@ -329,10 +331,10 @@ def test_of_four_measurements_the_highlight_is_left_out(spoilt: int) -> None:
     lit = Illumination(directions=ring(4, 40), intensities=np.ones((4, 1)))
     normals = np.tile(_halves(lit.directions)[spoilt], (4, 4, 1))
     plates = shoot(normals, lit)
-    assert error_deg(solve(plates, lit), normals).max() < 1e-3
+    assert error_deg(solve(LitPlates(plates, lit)), normals).max() < 1e-3
     plates[spoilt] = plates[spoilt] + np.float32(0.2)
-    assert error_deg(solve(plates, lit), normals).max() < 1e-3
-    assert error_deg(woodham1980.solve(plates, lit), normals).min() > 3
+    assert error_deg(solve(LitPlates(plates, lit)), normals).max() < 1e-3
+    assert error_deg(woodham1980.solve(LitPlates(plates, lit)), normals).min() > 3
 
 
 @pytest.mark.parametrize("spoilt", range(4))
@@ -346,8 +348,8 @@ def test_through_a_lens_the_highlight_of_four_is_the_one_that_is_mirrored_to_it(
     normals = np.tile(half / np.linalg.norm(half), (4, 4, 1))
     plates = shoot(normals, lit)
     plates[spoilt] = plates[spoilt] + np.float32(0.08)
-    assert error_deg(solve(plates, lit), normals).min() > 3
-    assert error_deg(solve(plates, replace(lit, view=lens)), normals).max() < 1e-2
+    assert error_deg(solve(LitPlates(plates, lit)), normals).min() > 3
+    assert error_deg(solve(LitPlates(plates, replace(lit, view=lens))), normals).max() < 1e-2
 
 
 def test_four_measurements_that_agree_are_all_used() -> None:
@@ -355,8 +357,8 @@ def test_four_measurements_that_agree_are_all_used() -> None:
     lit = Illumination(directions=ring(4, 40), intensities=np.ones((4, 1)))
     rng = np.random.default_rng(1)
     plates = [(plate + rng.normal(0, 0.001, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
-    plain = error_deg(woodham1980.solve(plates, lit), normals, inside).mean()
-    assert error_deg(solve(plates, lit), normals, inside).mean() < 1.2 * plain
+    plain = error_deg(woodham1980.solve(LitPlates(plates, lit)), normals, inside).mean()
+    assert error_deg(solve(LitPlates(plates, lit)), normals, inside).mean() < 1.2 * plain
 
 
 def test_what_is_not_seen_saturated_or_masked_counts_for_nothing() -> None:
@@ -370,7 +372,7 @@ def test_what_is_not_seen_saturated_or_masked_counts_for_nothing() -> None:
     seen[0] = False
     mask = inside.copy()
     mask[:, :10] = False
-    surface = solve(plates, lit, seen=seen, mask=mask)
+    surface = solve(LitPlates(plates, lit, seen=seen, mask=mask))
     assert surface.valid[mask].all()
     assert not surface.valid[~mask].any()
     assert error_deg(surface, normals).max() < 1e-3
@@ -384,10 +386,10 @@ def test_the_result_depends_neither_on_threads_nor_on_where_a_pixel_lies() -> No
     rng = np.random.default_rng(0)
     plates = list(rng.random((7, 300, 500), np.float32))
     lit = Illumination(directions=ring(7, 35), intensities=np.ones((7, 1)))
-    one, four = solve(plates, lit, threads=1), solve(plates, lit, threads=4)
+    one, four = solve(LitPlates(plates, lit), threads=1), solve(LitPlates(plates, lit), threads=4)
     np.testing.assert_array_equal(one.normals, four.normals)
     np.testing.assert_array_equal(one.error_deg, four.error_deg)
-    part = solve([np.ascontiguousarray(plate[100:110, 7:90]) for plate in plates], lit, misfit=one.misfit)
+    part = solve(LitPlates([np.ascontiguousarray(plate[100:110, 7:90]) for plate in plates], lit), misfit=one.misfit)
     np.testing.assert_allclose(part.normals, one.normals[100:110, 7:90], atol=2e-3)
 
 
@@ -395,8 +397,11 @@ def test_codes_and_half_floats_give_the_same_surface() -> None:
     normals, _ = ball(64, reach_deg=89)
     lit = Illumination(directions=ring(6, 35), intensities=np.ones((6, 1)))
     codes = [np.round(plate * 60_000 + 512).astype(np.uint16) for plate in shoot(normals, lit)]
-    exact = solve(codes, lit, black_level=512, scale=1 / 60_000)
-    half = solve(codes, lit, black_level=512, scale=1 / 60_000, half=True, residual=False, error=False)
+    exact = solve(LitPlates(codes, lit, black_level=512, scale=1 / 60_000))
+    half = solve(
+        LitPlates(codes, lit, black_level=512, scale=1 / 60_000),
+        asked=AskedSurface(half=True, residual=False, error=False),
+    )
     assert half.normals.dtype == np.float16
     assert half.residual is None
     assert half.error_deg is None
@@ -410,9 +415,9 @@ def test_more_rounds_and_other_weights_change_little_where_one_measurement_is_sp
     plates = shoot(normals, lit)
     plates[3] = plates[3] + np.float32(0.3)
     for how in (Reweighting(), Reweighting(rounds=8), Reweighting(loss="tukey")):
-        assert error_deg(solve(plates, lit, reweighting=how), normals, inside).mean() < 0.05
+        assert error_deg(solve(LitPlates(plates, lit), reweighting=how), normals, inside).mean() < 0.05
     blind = replace(TRUST_ALL, rounds=1, width=100.0)
-    assert error_deg(solve(plates, lit, reweighting=blind), normals, inside).mean() > 1
+    assert error_deg(solve(LitPlates(plates, lit), reweighting=blind), normals, inside).mean() > 1
 
 
 def test_auto_is_robust_from_five_lights_on() -> None:
@@ -426,7 +431,7 @@ def test_auto_is_robust_from_five_lights_on() -> None:
     for solver in ("auto", "least-squares"):
         assert Solving(solver=solver, error=True).solve(plates, lit).error_deg is not None
         assert Solving(solver=solver).solve(plates, lit).error_deg is None
-    assert huber1981.solve(plates, lit).valid.dtype == np.bool_
+    assert huber1981.solve(LitPlates(plates, lit)).valid.dtype == np.bool_
 
 
 def test_the_note_says_what_three_lights_cannot_show() -> None:

@@ -16,6 +16,7 @@ from picture_file import read_picture
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.weighing import Reweighting
 from psvideo.solve.normals.solving import Solving
@@ -36,10 +37,10 @@ class Subject(NamedTuple):
     def plain_deg(self) -> NDArray[np.float64]:
         """Errors of least squares over everything."""
         usable = woodham1980.EVERYTHING
-        return self.errors_deg(woodham1980.solve(self.plates, self.lit, usable=usable))
+        return self.errors_deg(woodham1980.solve(LitPlates(self.plates, self.lit), usable=usable))
 
     def robust(self, usable: woodham1980.Usable = huber1981.USABLE) -> Surface:
-        return huber1981.solve(self.plates, self.lit, usable=usable)
+        return huber1981.solve(LitPlates(self.plates, self.lit), usable=usable)
 
     def errors_deg(self, surface: Surface) -> NDArray[np.float64]:
         both = surface.valid & self.mask
@@ -119,8 +120,8 @@ def test_the_matte_sphere_of_washington_is_not_worse(shared_data: Path) -> None:
     truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
     lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
     sphere = Subject(plates, lit, truth, x * x + y * y < 0.95**2)
-    everywhere = huber1981.solve(plates, lit, reweighting=Reweighting(most_error_deg=179.0))
-    careful = sphere.errors_deg(woodham1980.solve(plates, lit))
+    everywhere = huber1981.solve(LitPlates(plates, lit), reweighting=Reweighting(most_error_deg=179.0))
+    careful = sphere.errors_deg(woodham1980.solve(LitPlates(plates, lit)))
     assert sphere.errors_deg(everywhere).mean() <= min(careful.mean(), sphere.plain_deg().mean())
     assert sphere.errors_deg(sphere.robust()).mean() <= careful.mean()
 

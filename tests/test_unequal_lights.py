@@ -12,6 +12,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.light_sigmas import light_sigmas
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Usable
 
@@ -94,7 +95,7 @@ def test_a_measurement_counts_from_one_level_on_whatever_its_light(module: objec
     plates = [np.full((1, 39), 0.2, np.float32) for _ in range(4)]
     plates[2], plates[3] = levels[None], np.zeros((1, 39), np.float32)
     usable = Usable(dark_level=0.01, shadow_ratio=0.0)
-    surface = module.solve(plates, lit, usable=usable)  # type: ignore[attr-defined]
+    surface = module.solve(LitPlates(plates, lit), usable=usable)  # type: ignore[attr-defined]
     np.testing.assert_array_equal(surface.normals.any(axis=-1)[0], levels > 0.01)
 
 

@@ -14,6 +14,7 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.synth.lamps.true_flashes import TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.stage import Stage, set_stage
@@ -68,7 +69,7 @@ class Filmed:
         return hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
 
     def solved(self, one: Round) -> Surface:
-        return solve([plate.image for plate in one.plates], self.lit, seen=seen(one))
+        return solve(LitPlates([plate.image for plate in one.plates], self.lit, seen=seen(one)))
 
 
 def seen(one: Round) -> np.ndarray:

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.inspect.findings import Finding, Level
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.lit_plates import LitPlates
 
 ROWS, COLS, LIGHTS = 1080, 1920, 8
 BYTES = ROWS * COLS * (4 * LIGHTS + 8)
@@ -36,7 +38,7 @@ def _solver() -> Finding:
     ring = np.stack([across * np.cos(around), across * np.sin(around), up], axis=-1)
     lit = Illumination(directions=ring, intensities=np.ones((LIGHTS, 1)))
     source, target = np.ones(BYTES // 2, np.uint8), np.ones(BYTES // 2, np.uint8)
-    solved_s = _best_s(lambda: solve(plates, lit, half=True, residual=False))
+    solved_s = _best_s(lambda: solve(LitPlates(plates, lit), asked=AskedSurface(half=True, residual=False)))
     copied_s = _best_s(lambda: np.copyto(target, source))
     ratio = solved_s / copied_s
     slow = ratio > MOST_COPIES

@@ -46,8 +46,6 @@ class Evidence(LitPlates):
     indirect: Indirect | None = None
     left: Left | None = None
     metal_deg: Floats | None = None
-    black_level: float = 0.0
-    scale: float = 1.0
     spare: Path | None = None
     grid_px: int = GRID_PX
 

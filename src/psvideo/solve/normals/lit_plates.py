@@ -13,7 +13,9 @@ Plates = Sequence[Samples] | Sequence[Mixture]
 
 @dataclass(frozen=True)
 class LitPlates:
-    """Plates (row, col[, channel]) and the light that falls on what they show.
+    """Plates, one per light of ``lit`` in its order, each (row, col) or (row, col, 3), all of one type: float32 with
+    1.0 = saturation, or uint16 codes, for which (code - ``black_level``) * ``scale`` is that; or pictures that are not
+    made yet, of which no more than a band of rows ever is.
 
     ``seen``: which rows (light, row) or pixels (light, row, col) every light shows; ``mask`` (row, col): where to
     solve; both everything where they are left out. ``unsure`` (light, row, col), on a grid of its own over the picture,
@@ -29,6 +31,8 @@ class LitPlates:
     unsure: Floats | None = None
     moves: Mask | None = None
     steadied: bool = False
+    black_level: float = 0.0
+    scale: float = 1.0
 
     @property
     def moved(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from psvideo.model.arrays import Floats, Mask
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Metal, Subject, Surface
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
@@ -134,10 +135,7 @@ class Solving:
             return None
         noise = noise_of(given.plates, given.lit)
         usable = _usable(noise, given.lit, "robust")
-        return huber1981.look(
-            given.plates, given.lit, seen=given.seen, mask=given.mask, usable=usable, reweighting=EVERYTHING,
-            plate_noise=noise, spare=self.spare, unsure=given.unsure,
-        )  # fmt: skip
+        return huber1981.look(given, usable=usable, reweighting=EVERYTHING, plate_noise=noise, spare=self.spare)
 
     def measured(self, given: LitPlates, *, noise: PlateNoise | None = None) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by; ``noise`` is that of
@@ -151,35 +149,19 @@ class Solving:
 
     def _solved(self, one: Evidence, noise: PlateNoise, looks: Looks) -> Surface:
         """Return what the solver makes of the plates."""
+        asked = AskedSurface(half=self.half, residual=self.residual, spare=self.spare)
         if self.method(len(one.plates)) == "robust":
             return huber1981.solve(
-                one.plates,
-                one.lit,
-                seen=one.seen,
-                mask=one.mask,
-                half=self.half,
-                residual=self.residual,
+                one,
                 usable=one.usable,
                 reweighting=EVERYTHING,
+                asked=asked,
                 subject=self.subject,
                 plate_noise=noise,
-                spare=self.spare,
-                unsure=one.unsure,
-                moves=one.moves,
                 looks=looks,
             )
-        residual = self.residual or len(one.plates) > 3  # three measurements leave none
-        return woodham1980.solve(
-            one.plates,
-            one.lit,
-            seen=one.seen,
-            mask=one.mask,
-            half=self.half,
-            residual=residual,
-            usable=one.usable,
-            spare=self.spare,
-            looks=looks,
-        )
+        asked = replace(asked, residual=self.residual or len(one.plates) > 3)  # three measurements leave none
+        return woodham1980.solve(one, usable=one.usable, asked=asked, looks=looks)
 
 
 def _usable(noise: PlateNoise, lit: Illumination, method: Method) -> Usable:

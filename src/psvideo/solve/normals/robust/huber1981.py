@@ -6,59 +6,47 @@ others (shadow, or light that grazes), is left out; highlights only ever add lig
 without the brightest few.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from psvideo.model.arrays import Floats, Mask
 from psvideo.model.surface import Misfit, Subject, Surface
-from psvideo.plates.mixing.mixture import Mixture
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.light_sigmas import combined_noise
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust.first_look import first_look
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.solution import Solution
 from psvideo.solve.normals.robust.weighing import Reweighting, limit_deg, weights
-from psvideo.solve.normals.task import Looks, Samples, Usable
+from psvideo.solve.normals.task import Looks, Usable
 
 USABLE = Usable(shadow_ratio=0.4)
 """Least squares needs every measurement; here one that is dark beside the others may go sooner."""
 
 
 def solve(
-    plates: Sequence[Samples] | Sequence[Mixture],
-    lit: Illumination,
+    given: LitPlates,
     *,
-    seen: Mask | None = None,
-    mask: Mask | None = None,
     usable: Usable = USABLE,
     reweighting: Reweighting = Reweighting(),
-    black_level: float = 0.0,
-    scale: float = 1.0,
-    half: bool = False,
-    residual: bool = True,
-    error: bool = True,
+    asked: AskedSurface = AskedSurface(),
     misfit: Misfit | None = None,
     subject: Subject | None = None,
     plate_noise: PlateNoise | None = None,
-    spare: Path | None = None,
-    unsure: Floats | None = None,
-    moves: Mask | None = None,
     looks: Looks | None = None,
     threads: int | None = None,
 ) -> Surface:
     """Return the surface that explains most of the plates, one per light.
 
-    Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error as well. ``misfit`` is
-    what is typical of the picture; left out, it is found first, from a sample of the picture's rows. ``subject`` is
-    what rounds of a take share; left out, it is found from these plates alone, where they are not ``unsure`` for motion
-    (light, row, col of a grid of its own). What ``moves`` (row, col of that grid) is not typical where what stands
-    fits better. Where ``plate_noise`` is known, what plain least squares explains to the noise is left to it: nothing
-    is better there.
+    ``usable`` and ``looks`` are as for ``woodham1980.solve``. ``misfit`` is what is typical of the picture; left out,
+    it is found first, from a sample of the picture's rows. ``subject`` is what rounds of a take share; left out, it is
+    found from these plates alone, where they are not ``unsure`` for motion. What ``moves`` is not typical where what
+    stands fits better. Where ``plate_noise`` is known, what plain least squares explains to the noise is left to it:
+    nothing is better there.
 
     Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
     highlight is left out; three are taken as they are, and nothing shows whether one of them is a highlight.
@@ -71,17 +59,12 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
-    solution = Solution.of(
-        plates, lit, seen, mask, usable, black_level, scale, noise,
-        half=half, residual=residual, spare=spare, threads=threads,
-    )  # fmt: skip
+    noise, reweighting = _noise_of(plate_noise, given.lit), _dimmed(reweighting, plate_noise)
+    solution = Solution.of(given, usable, noise, asked, threads=threads)
     if misfit is None:
-        found, misfit, step = first_look(solution, lit, reweighting, noise, unsure, moves)
+        found, misfit, step = first_look(solution, given.lit, reweighting, noise, given.unsure, given.moves)
         if misfit is not None and subject is None:
-            points = points_of(
-                plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale, unsure=unsure
-            )
+            points = points_of(given, found, usable, step=step)
             subject = Subject(reflectance=None if points is None else reflectance_of([points]))
         if misfit is not None and subject is not None:
             misfit = replace(misfit, reflectance=subject.reflectance)
@@ -97,32 +80,26 @@ def solve(
         unit=1 / float(solution.given.albedo_scale),
     )
     knowing = None if looks is None else looks.knowing(model)
-    solution.run(how, error=error, reflecting=model is not None, looks=knowing)
-    return replace(solution.surface(error=error), misfit=misfit)
+    solution.run(how, error=asked.error, reflecting=model is not None, looks=knowing)
+    return replace(solution.surface(error=asked.error), misfit=misfit)
 
 
 def look(
-    plates: Sequence[Samples] | Sequence[Mixture],
-    lit: Illumination,
+    given: LitPlates,
     *,
-    seen: Mask | None = None,
-    mask: Mask | None = None,
     usable: Usable = USABLE,
     reweighting: Reweighting = Reweighting(),
     plate_noise: PlateNoise | None = None,
     spare: Path | None = None,
-    unsure: Floats | None = None,
 ) -> SubjectPoints | None:
     """Return points of the subject, as ``solve`` finds its reflectance from; None where they or the lights are too few.
 
     Arguments are those of ``solve``.
     """
-    noise, reweighting = _noise_of(plate_noise, lit), _dimmed(reweighting, plate_noise)
-    solution = Solution.of(plates, lit, seen, mask, usable, 0.0, 1.0, noise, half=False, residual=False, spare=spare)
-    found, misfit, step = first_look(solution, lit, reweighting, noise, unsure)
-    if misfit is None:
-        return None
-    return points_of(plates, lit, found, usable, step=step, seen=seen, black_level=0.0, scale=1.0, unsure=unsure)
+    noise, reweighting = _noise_of(plate_noise, given.lit), _dimmed(reweighting, plate_noise)
+    solution = Solution.of(given, usable, noise, AskedSurface(residual=False, spare=spare))
+    found, misfit, step = first_look(solution, given.lit, reweighting, noise, given.unsure)
+    return None if misfit is None else points_of(given, found, usable, step=step)
 
 
 def _noise_of(plate_noise: PlateNoise | None, lit: Illumination) -> tuple[float, float]:

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, fitted, joined
 from psvideo.solve.normals.robust.sure_of_motion import sure_of_motion
@@ -26,12 +27,10 @@ def reflectance_of(looks: Sequence[SubjectPoints]) -> Reflectance | None:
     return fitted(joined(looks)) if looks else None
 
 
-def points_of(
-    plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, found: Surface, usable: Usable,
-    *, step: int, seen: Mask | None, black_level: float, scale: float, unsure: Floats | None = None,
-) -> SubjectPoints | None:  # fmt: skip
+def points_of(given: LitPlates, found: Surface, usable: Usable, *, step: int) -> SubjectPoints | None:
     """Return points of a subject solved in every ``step``-th row; None where they or the lights are too few. Arguments
     are those of ``huber1981.solve``; what is ``unsure`` of the plates is passed over."""
+    plates, lit, unsure = given.plates, given.lit, given.unsure
     if len(plates) < LIGHTS_FOR_REFLECTANCE:
         return None
     solved = np.arange(0, found.valid.shape[0], step)
@@ -45,7 +44,9 @@ def points_of(
     chosen = np.linspace(0, len(where) - 1, min(few, len(where))).astype(np.intp)
     at = (rows[where[chosen]], cols[chosen])
     normals = found.normals[at].astype(np.float64)
-    return points_at(plates, lit, at, usable, normals, seen=seen, black_level=black_level, scale=scale)
+    return points_at(
+        plates, lit, at, usable, normals, seen=given.seen, black_level=given.black_level, scale=given.scale
+    )
 
 
 def points_at(

@@ -1,18 +1,16 @@
 """A picture's task for the robust solver, and where its solution goes as the loops run over its rows."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.model.arrays import Doubles, Floats
 from psvideo.model.surface import Surface
-from psvideo.plates.mixing.mixture import Mixture
+from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
-from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.light_sigmas import root_sigmas, with_noise
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.task import (
     FEW,
     Looks,
@@ -40,31 +38,35 @@ class Solution:
     given: Task
     result: Result
     predicted: Samples
-    half: bool
-    residual: bool
+    asked: AskedSurface
     threads: int | None
 
     @classmethod
     def of(
-        cls, plates: Sequence[Samples] | Sequence[Mixture], lit: Illumination, seen: Mask | None, mask: Mask | None,
-        usable: Usable, black_level: float, scale: float, noise: tuple[float, float],
-        *, half: bool, residual: bool, spare: Path | None, threads: int | None = None,
-    ) -> "Solution":  # fmt: skip
+        cls,
+        plates: LitPlates,
+        usable: Usable,
+        noise: tuple[float, float],
+        asked: AskedSurface,
+        *,
+        threads: int | None = None,
+    ) -> "Solution":
         """Make room for the solution of plates; arguments are those of ``solve``, ``noise`` that of a measurement, its
         channels combined: in the dark, and what a unit of light adds, as variances."""
-        shown = ShownPlates.of(plates)
+        shown, lit, seen, mask = ShownPlates.of(plates.plates), plates.lit, plates.seen, plates.mask
         check_arrays(shown.samples, lit, seen, mask)
         shown = shown.as_floats()  # one kind of samples, and so one loop to compile
         (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
-        as_it_is = with_noise(task(shown.samples, lit, seen, mask, usable, black_level, scale), lit, noise)
+        pixels, half, spare = rows * cols, asked.half, asked.spare
+        read = task(shown.samples, lit, seen, mask, usable, plates.black_level, plates.scale)
+        as_it_is = with_noise(read, lit, noise)
         return cls(
             shown=shown,
             as_it_is=as_it_is,
             given=_balanced(as_it_is, root_sigmas(lit)),
-            result=empty_result(rows * cols, channels, half=half, residual=residual, spare=spare),
-            predicted=planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare),
-            half=half,
-            residual=residual,
+            result=empty_result(pixels, channels, half=half, residual=asked.residual, spare=spare),
+            predicted=planes_for((pixels,), np.uint16 if half else np.float32, pixels=pixels, folder=spare),
+            asked=asked,
             threads=threads,
         )
 
@@ -91,12 +93,12 @@ class Solution:
         left = np.zeros(0, np.float32) if unexplained is None else unexplained
 
         def memory(one: Task) -> tuple[kernel.Memory, Work | None]:
-            own = kernel.working_memory(one, reflecting=reflecting, residual=self.residual)
+            own = kernel.working_memory(one, reflecting=reflecting, residual=self.asked.residual)
             return own, None if looks is None else looks.memory()
 
         def band(one: Task, room: tuple[kernel.Memory, Work | None], first: int, last: int) -> None:
             own, beside = room
-            kernel.solve_rows(one, kernel.as_bytes(result), self.half, into, left, own, how, first, last, step)
+            kernel.solve_rows(one, kernel.as_bytes(result), self.asked.half, into, left, own, how, first, last, step)
             if looks is not None and beside is not None:
                 looks.look(one, result, beside, first, last)
             let_rows_go(result, cols, first, last)
@@ -106,7 +108,7 @@ class Solution:
 
     def surface(self, *, error: bool = True) -> Surface:
         """Return what was solved as a surface, in the same memory."""
-        return surface_of(self.result, self.predicted if error else None, self.shown.shape, half=self.half)
+        return surface_of(self.result, self.predicted if error else None, self.shown.shape, half=self.asked.half)
 
 
 def _balanced(given: Task, sigmas: Doubles) -> Task:
