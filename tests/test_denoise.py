@@ -21,7 +21,8 @@ from psvideo.report.observe.facts import InstantFacts, instant_facts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.run_report import RunReport, report_record, steadiness_of
-from psvideo.solve.instants import Instant, denoised
+from psvideo.solve.denoised import denoised
+from psvideo.solve.instants import Instant
 
 ROWS, COLS = 96, 128
 

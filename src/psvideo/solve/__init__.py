@@ -1,6 +1,7 @@
 """Plates and a rig in, the surface out: normals, albedo, depth.
 
-``of_take`` solves a take, ``images`` arrays (checked by ``array_checks``), ``instants`` rounds of plates: begin there.
+``of_take`` solves a take, ``images`` arrays (checked by ``array_checks``), ``instants`` rounds of plates (as a
+``given_round``): begin there. ``denoised`` averages surfaces where nothing moves.
 
 - ``normals``: the solvers, and how far their results can be trusted
 - ``filling``: estimates where fewer than three lights reach

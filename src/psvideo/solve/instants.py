@@ -4,37 +4,28 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import Masks
 from psvideo.model.irradiance.falloff import Falloff
-from psvideo.model.irradiance.intensity import (
-    image_evened,
-    image_per_saturation,
-    lights_as_planned,
-    per_saturation,
-    where_least_arrives,
-)
+from psvideo.model.irradiance.intensity import lights_as_planned, per_saturation, where_least_arrives
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Subject, Surface
-from psvideo.plates.align.denoise import Average, ResultNoise, added, averaged
 from psvideo.plates.sequence import Round
 from psvideo.solve.at_rest import AtRest
 from psvideo.solve.depth import View, view_of
+from psvideo.solve.given_round import GivenRound
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
-from psvideo.solve.normals.lit_plates import LitPlates, Plates
 from psvideo.solve.normals.metal.metal_fit import metal_of
-from psvideo.solve.normals.plate_noise import spread_of
 from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.solving import Solving, most_claimed_deg
 from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of
-from psvideo.solve.steady import SHOWN, Steady, steadied
+from psvideo.solve.steady import Steady, steadied
 from psvideo.solve.sweeping import swept
 
 
@@ -101,32 +92,6 @@ def subject_of(
     return Subject(reflectance=reflectance_of(known), metal=metal_of(known)) if looks else None
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Given:
-    """A round as ``LitPlates`` but for their light, which near lights' change as the surface is found. ``seen`` is what
-    every light shows, ``shown`` the same, or None where that is all."""
-
-    plates: Plates
-    seen: NDArray[np.bool_]
-    shown: NDArray[np.bool_] | None
-    mask: NDArray[np.bool_] | None
-    unsure: NDArray[np.float32] | None
-    moves: NDArray[np.bool_] | None
-    steadied: bool
-
-    def under(self, lit: Illumination) -> LitPlates:
-        """Return the plates as this light shows them."""
-        return LitPlates(
-            plates=self.plates,
-            lit=lit,
-            seen=self.shown,
-            mask=self.mask,
-            unsure=self.unsure,
-            moves=self.moves,
-            steadied=self.steadied,
-        )
-
-
 @dataclass(kw_only=True)
 class _RoundSolver:
     """What all rounds are solved with; and ``steady`` and ``at_rest``, which are known of those before and renewed by
@@ -179,7 +144,7 @@ class _RoundSolver:
         if one.doubtful is not None:
             surface = _without(surface, one.doubtful)
         steady = steadied(
-            self.steady, surface, one.number, one.stood, _shown(given.seen),
+            self.steady, surface, one.number, one.stood, given.shown_by_all,
             moved=one.moved, most_deg=most_claimed_deg(len(one.plates)), spare=self.solving.spare,
         )  # fmt: skip
         self.steady = None if self.one_by_one else steady
@@ -193,18 +158,8 @@ class _RoundSolver:
         lit = self._light(one)(ground=None) if self.near is None else self._surface(one, given)[1]
         return self.solving.look(given.under(lit))
 
-    def _given(self, one: Round) -> _Given:
-        whole = all(plate.seen.ndim == 1 for plate in one.plates)
-        seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
-        return _Given(
-            plates=_pictures(one, self.shares),
-            seen=seen,
-            shown=None if seen.all() else seen,
-            mask=None if self.masks is None else self.masks.at(one.number),
-            unsure=_unsure(one, self.shares),
-            moves=None if one.motion is None else one.motion.moves,
-            steadied=one.motion is not None and one.motion.steadied,
-        )
+    def _given(self, one: Round) -> GivenRound:
+        return GivenRound.of(one, masks=self.masks, shares=self.shares)
 
     def _scaled(self, one: Round) -> list[Light]:
         return [per_saturation(light, plate.saturation) for light, plate in zip(self.lights, one.plates, strict=True)]
@@ -213,7 +168,7 @@ class _RoundSolver:
         channels = 1 if len(one.plates[0].shape) == 2 else 3
         return partial(illumination, self._scaled(one), channels=channels, view=self.view)
 
-    def _surface(self, one: Round, given: _Given) -> tuple[Surface, Illumination]:
+    def _surface(self, one: Round, given: GivenRound) -> tuple[Surface, Illumination]:
         """Return a round's surface, and the light that it was solved with in the end: near lights' changes on the way
         as the surface is found."""
         light, near = self._light(one), None if self.near is None else self.near.at(one.number)
@@ -246,56 +201,3 @@ def _without(surface: Surface, doubtful: NDArray[np.bool_]) -> Surface:
         if plane is not None:
             plane[empty] = 0
     return replace(surface, valid=valid)
-
-
-def _shown(seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return, (row, col) or (row, 1) or (1, 1), the rows and columns that every light showed at least a part of: frames
-    that are missing lack whole ones, motion hides parts."""
-    if seen.all():
-        return SHOWN
-    if seen.ndim == 2:
-        return np.asarray(np.logical_and.reduce(seen), np.bool_)[:, None]
-    rows, cols = (np.any(seen, axis=axis, keepdims=True).all(axis=0) for axis in (2, 1))
-    return np.asarray(rows & cols)
-
-
-def _pictures(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> Plates:
-    """Return a round's plates on a scale on which they are clipped at 1.0, and evened; made only where that asks it."""
-    if shares is None and all(plate.saturation == 1.0 for plate in one.plates):
-        return [plate.picture for plate in one.plates]
-    plates = [image_per_saturation(plate.image, plate.saturation) for plate in one.plates]
-    if shares is None:
-        return plates
-    return [image_evened(plate, share) for plate, share in zip(plates, shares, strict=True)]
-
-
-def _unsure(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> NDArray[np.float32] | None:
-    """Return by how much a round's plates may be off for motion, on the scale of ``_pictures``."""
-    if one.unsure is None:
-        return None
-    each = [plane / np.float32(plate.saturation) for plane, plate in zip(one.unsure, one.plates, strict=True)]
-    if shares is not None:
-        size = one.unsure.shape[:0:-1]
-        small = [np.asarray(cv2.resize(share, size, interpolation=cv2.INTER_AREA), np.float32) for share in shares]
-        each = [image_evened(plane, share) for plane, share in zip(each, small, strict=True)]
-    return np.stack(each)
-
-
-def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:
-    """Average every surface with those before it, up to this many ``results``, where nothing moves.
-
-    An average begins with the block of ``results`` numbers before an instant's own, so that it depends on no others.
-    """
-    average: Average | None = None
-    later: Average | None = None
-    block = 0
-    for instant in instants:
-        if block != (own := instant.round.number // results):
-            average, later, block = later if own == block + 1 else None, None, own
-        together = later is average
-        plates = instant.round.plates
-        noise = ResultNoise.of(plates, spread_of([plate.picture for plate in plates]))
-        average, surface = averaged(average, instant.surface, results, noise=noise)
-        later = average if together else added(later, instant.surface, results, noise=noise)
-        yield replace(instant, surface=surface)
-        del instant, surface

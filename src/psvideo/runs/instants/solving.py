@@ -23,8 +23,9 @@ from psvideo.runs.delivery.relit import blur_of
 from psvideo.runs.instants.depths import shape_of
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece
 from psvideo.runs.instants.reporting import observing
+from psvideo.solve.denoised import denoised
 from psvideo.solve.depth import kept_beside, reservations, scale_note
-from psvideo.solve.instants import Instant, denoised, subject_of, surfaces
+from psvideo.solve.instants import Instant, subject_of, surfaces
 
 SPECULAR_OF_LIGHTS = "specular_of_lights"
 """The folder of what exceeds the diffuse model under each light, sequences as those of the plates."""

@@ -7,6 +7,7 @@ import numpy as np
 from psvideo.model.arrays import Integers, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.best_fit import BestFit, best_fit
 from psvideo.sync.rowfit.coarse.retime import regular_step, stood_in
 from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
 from psvideo.sync.rowfit.compiled_profiles import unexplained
@@ -15,20 +16,10 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
-from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.curve import (
-    Curve,
-    Straightened,
-    maybe_otherwise_s,
-    nominally_s,
-    straight,
-    straightened,
-)
-from psvideo.sync.rowfit.unknowns.freed import Freed, freed
+from psvideo.sync.rowfit.unknowns.curve import nominally_s, straight
 from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
 from psvideo.sync.rowfit.unknowns.misread import OtherCurve, doubt_s, misread
-from psvideo.sync.rowfit.unknowns.plateau import centred
-from psvideo.sync.rowfit.unknowns.restless import across, restless
+from psvideo.sync.rowfit.unknowns.restless import across
 from psvideo.sync.rowfit.unknowns.softness import misfit
 from psvideo.sync.rowfit.unknowns.unsteady import unsteady_s
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
@@ -36,17 +27,8 @@ from psvideo.sync.rowfit.unlit import unlit, with_unlit
 COARSE_ROWS = 288
 FLASH_ROWS = 8
 """Rows that a flash must still span where a clip of more row means than are enough gets its rows averaged."""
-SURER = 0.8
-"""Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
-MOST_WINDOWS = 400
 UNSURE = 0.02
 """A fit whose times are unsure by more than this share of the shortest flash is worth being read by other curves."""
-MAINS_HZ = (100.0, 120.0)
-MAINS_EXPLAINS = 0.8
-"""Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
-share of what frequencies that mains do not have leave: where many rows saturate, anything that swings explains much."""
-OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
-"""Frequencies tried instead, as swings more or fewer in a window: near enough to be alike, far enough to differ."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,35 +116,19 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Best:
-    """The best fit of some rows, and what it cannot know of its own error.
-
-    ``apart_s``: by how much times differ with how they are fitted. ``slack_s`` and ``soft_s`` are as in ``ClipFit``.
-    ``curves`` were taken out of the rows.
-    """
-
-    rows: Profiles
-    fit: Fit
-    apart_s: float
-    slack_s: float
-    soft_s: float
-    curves: tuple[Curve, ...]
-
-
-def _rightly_read(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> tuple[_Best, OtherCurve | None]:
+def _rightly_read(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> tuple[BestFit, OtherCurve | None]:
     """Return the best fit of some rows, read by another curve where that explains more than what the fit sets free."""
-    best = _best_fit(plan, rows, start, free)
+    best = best_fit(plan, rows, start, free)
     if _strays(plan, best, free):
         reading, others, unsure_s = misread(plan, best.rows, best.fit, free)
         if reading:
-            best = _best_fit(plan, reading.of(rows), start, free)
+            best = best_fit(plan, reading.of(rows), start, free)
             unsure_s = doubt_s(best.rows, best.fit, others)
         return replace(best, apart_s=float(np.hypot(best.apart_s, unsure_s))), reading
     return best, None
 
 
-def _strays(plan: Plan, best: _Best, free: tuple[str, ...]) -> bool:
+def _strays(plan: Plan, best: BestFit, free: tuple[str, ...]) -> bool:
     """Return whether a fit strays so far from the plan, or leaves times so unsure, that rows may be misread. It takes
     rows that open one after another to show how much of a flash each saw."""
     if best.fit.beat.row_time_s * float(best.rows.place.max()) < plan.shortest_flash_s:
@@ -173,36 +139,7 @@ def _strays(plan: Plan, best: _Best, free: tuple[str, ...]) -> bool:
     return float(np.hypot(apart_s, np.hypot(best.fit.shift_error_s, best.apart_s))) > UNSURE * plan.shortest_flash_s
 
 
-def _best_fit(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> _Best:
-    """Fit the times to rows, from the plain model to all that real footage may differ in from it."""
-    rows, fit = _restless(plan, rows, fitted(plan, rows, start, free), free)
-    fit = _with_mains(plan, rows, fit, free)
-    rows, fit, apart_s = _in_short_windows(plan, rows, fit, free)
-    held = straightened(plan, rows, fit, free)
-    differing = freed(plan, held.rows, held.fit, free)
-    final, doubts_s = _told_from_curve(plan, held, differing, free)
-    rows, fit = final.rows, final.fit
-    if fit.errors_s:
-        fit, apart_s = _with_window_errors(plan, rows, fit)
-    fit, slack_s = centred(plan, rows, fit)
-    apart_s = float(np.sqrt(apart_s**2 + differing.unsure_s**2 + doubts_s**2))
-    return _Best(rows=rows, fit=fit, apart_s=apart_s, slack_s=slack_s, soft_s=differing.soft_s, curves=final.curves)
-
-
-def _told_from_curve(
-    plan: Plan, held: Straightened, differing: Freed, free: tuple[str, ...]
-) -> tuple[Straightened, float]:
-    """Return what was freed with the curve that shows beside it, and by how much times are in doubt because exposure
-    and readout may be otherwise."""
-    final = replace(held, fit=differing.fit, unsure_s=0.0)
-    if "exposure_s" in differing.fit.errors_s:
-        beside = straightened(plan, held.rows, differing.fit, tuple(differing.fit.errors_s))
-        final = replace(beside, curves=(*held.curves, *beside.curves))
-    otherwise_s = maybe_otherwise_s(plan, final.rows, final.fit, tuple(final.fit.errors_s))
-    return final, float(np.hypot(final.unsure_s, otherwise_s))
-
-
-def _error_s(plan: Plan, best: _Best, as_seen: Fit, stray: Jitter) -> float:
+def _error_s(plan: Plan, best: BestFit, as_seen: Fit, stray: Jitter) -> float:
     """Return the standard error of all flashes' times together.
 
     That exposure or readout may be a little off from what plans say counts where that alone is more than all the rest:
@@ -227,16 +164,6 @@ def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
     return max(COARSE_ROWS, ENOUGH_SAMPLES // len(rows.value), sharp)
 
 
-def _restless(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit]:
-    """Fit again with what flashes that differ say together, where the subject moves."""
-    for _ in range(2):
-        rows = restless(plan, rows, fit.beat)
-        if rows.restless is None:
-            break
-        fit = fitted(plan, rows, fit.beat, free)
-    return rows, fit
-
-
 def _as_seen(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Profiles, Fit]:
     """Return the fit with what it leaves of the picture itself: flashes that differ are not explained by differing."""
     if rows.restless is None:
@@ -244,55 +171,3 @@ def _as_seen(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Profiles, Fit]:
     plain = replace(rows, restless=None)
     rest = unexplained(plan, plain, fit.beat, fit.weight)
     return plain, replace(fit, rest=rest, explained=explained(plain, rest))
-
-
-def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
-    """Fit brightnesses again more often where the subject moves so much that this makes the times better.
-
-    Return too how far apart the times are with and without: an error that neither of the two fits can know of.
-    """
-    if rows.restless is not None:
-        return rows, fit, rms_apart_s(rows, fit.beat, fitted(plan, _other_windows(rows), fit.beat, free).beat)
-    short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
-    other = fitted(plan, short, fit.beat, free)
-    apart_s = rms_apart_s(rows, fit.beat, other.beat)
-    taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
-    return taken, better, apart_s
-
-
-def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, float]:
-    """Add to the errors of what is free how far it moves when brightnesses are fitted twice as often.
-
-    Return too how far apart the flashes' times are then.
-    """
-    other = fitted(plan, _other_windows(rows), fit.beat, tuple(fit.errors_s))
-    errors_s = {
-        name: float(np.hypot(error_s, getattr(other.beat, name) - getattr(fit.beat, name)))
-        for name, error_s in fit.errors_s.items()
-    }
-    return replace(fit, errors_s=errors_s), rms_apart_s(rows, fit.beat, other.beat)
-
-
-def _other_windows(rows: Profiles) -> Profiles:
-    """Return the same profiles in windows half as long; twice as long where flashes differ, and so need none."""
-    many = len(rows.window_start)
-    return rows.windowed(
-        max(len(rows.value) // (2 * many) if rows.restless is None else 2 * len(rows.value) // many, 1)
-    )
-
-
-def _with_mains(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
-    """Try ambient light that flickers with the mains, and keep it where it explains much of what is left."""
-
-    def left(hz: float) -> float:
-        beat = replace(fit.beat, beat_hz=(hz,))
-        return float((fit.weight * unexplained(plan, rows, beat, fit.weight) ** 2).sum())
-
-    hz = min(MAINS_HZ, key=left)
-    least = left(hz)
-    if least > MAINS_EXPLAINS * fit.loss:
-        return fit
-    window_s = rows.window_frames * rows.period_s
-    if least > MAINS_EXPLAINS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
-        return fit
-    return fitted(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)
