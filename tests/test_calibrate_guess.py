@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pictures_of_lights import off_deg, sphere_pictures, washington, ways
+from angles import angles_deg
+from pictures_of_lights import sphere_pictures, washington, ways
 
 from psvideo.calibrate.guess import guess_rig
 from psvideo.cli.app import main
@@ -18,7 +19,7 @@ def test_a_guess_is_right_where_its_priors_hold(lights: int, prior: Prior | None
     directions = ways(lights)
     guessed = guess_rig(sphere_pictures(directions, np.ones((lights, 3))), prior=prior)
     found = np.array([light.direction for light in guessed.rig.lights])
-    assert off_deg(found, directions).max() < 6
+    assert angles_deg(found, directions).max() < 6
     assert all(light.error_deg == 20 for light in guessed.rig.lights)
 
 
@@ -43,5 +44,5 @@ def test_a_guessed_rig_says_so_in_the_file_and_on_the_terminal(
     assert "A GUESS" in capsys.readouterr().err
     assert out.read_text().startswith("# A GUESS")
     lights = read_rig(out).lights
-    assert off_deg(np.array([light.direction for light in lights]), chrome).mean() < 20
+    assert angles_deg(np.array([light.direction for light in lights]), chrome).mean() < 20
     assert main(["calibrate", "guess", str(folder), "-o", str(tmp_path / "x.toml"), "--prior", "luck"]) == 2

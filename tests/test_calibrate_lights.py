@@ -5,8 +5,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from angles import angles_deg
 from picture_file import read_picture
-from pictures_of_lights import CIRCLE, HIGH, WIDE, off_deg, sphere_pictures, washington, ways
+from pictures_of_lights import CIRCLE, HIGH, WIDE, sphere_pictures, washington, ways
 
 from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
@@ -24,7 +25,7 @@ def test_a_matte_sphere_shows_directions_and_intensities_per_channel(focal_px: f
     found = measure_matte_sphere(
         sphere_pictures(directions, strengths, view=view), given_outline(view, CIRCLE), albedo=0.6
     )
-    assert off_deg(np.array([light.direction for light in found]), directions).max() < 0.1
+    assert angles_deg(np.array([light.direction for light in found]), directions).max() < 0.1
     np.testing.assert_allclose([light.intensity for light in found], strengths, rtol=0.005)
     assert all(0.1 < light.error_deg < 1.5 for light in found), "half a pixel on a marked outline"
 
@@ -46,7 +47,7 @@ def test_gloss_and_saturation_are_weighed_out_of_a_matte_sphere() -> None:
     glossy = sphere_pictures(directions, strengths, gloss=0.8)
     assert glossy.saturated.any()
     found = measure_matte_sphere(glossy, given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE))
-    assert off_deg(np.array([light.direction for light in found]), directions).max() < 0.5
+    assert angles_deg(np.array([light.direction for light in found]), directions).max() < 0.5
     np.testing.assert_allclose([light.intensity for light in found], 1.0, rtol=0.01)
 
 
@@ -58,7 +59,7 @@ def test_lamps_near_a_matte_sphere_are_where_they_stand(radii: float, within_deg
     found = measure_matte_sphere(
         pictures, given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE), albedo=0.6
     )
-    assert off_deg(np.array([light.direction for light in found]), directions).max() < within_deg
+    assert angles_deg(np.array([light.direction for light in found]), directions).max() < within_deg
     np.testing.assert_allclose([light.intensity for light in found], strengths, rtol=0.02)
     np.testing.assert_allclose([1 / light.nearness for light in found], radii, rtol=0.2)
 
@@ -78,7 +79,7 @@ def test_light_in_the_room_makes_lights_of_a_matte_sphere_doubted(room: float) -
     directions, strengths = ways(6), np.full((6, 3), 0.5)
     pictures = sphere_pictures(directions, strengths, room=room)
     found = measure_matte_sphere(pictures, given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE))
-    off = off_deg(np.array([light.direction for light in found]), directions)
+    off = angles_deg(np.array([light.direction for light in found]), directions)
     assert off.max() > 1
     assert all(light.fault or one < 2.5 * light.error_deg for light, one in zip(found, off, strict=True))
     assert all("fades less towards its shadow" in light.fault for light in found if light.fault)
@@ -94,7 +95,7 @@ def test_a_wrong_outline_costs_what_the_standard_error_says() -> None:
     for dx, dy, dr in np.random.default_rng(3).normal(0, 0.5, (8, 3)):
         outline = given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), (x + dx, y + dy, radius + dr))
         found = measure_matte_sphere(pictures, outline)
-        off = off_deg(np.array([light.direction for light in found]), directions)
+        off = angles_deg(np.array([light.direction for light in found]), directions)
         ratios += list(off / [light.error_deg for light in found])
     assert 0.3 < np.sqrt(np.mean(np.square(ratios))) < 1.5
 
@@ -116,7 +117,7 @@ def test_a_real_matte_sphere_agrees_with_the_chrome_one(
     assert main(["calibrate", "matte-sphere", str(folder), "-o", str(out)]) == 0
     assert "the focal length is not known" in capsys.readouterr().err
     lights = read_rig(out).lights
-    off = off_deg(np.array([light.direction for light in lights]), chrome)
+    off = angles_deg(np.array([light.direction for light in lights]), chrome)
     assert off.mean() < 3.5  # those ignore second reflections: 8 degrees for light 1
     assert np.median(off / np.array([light.error_deg for light in lights])) < 1.5
     strengths = np.array([light.intensity for light in lights]).mean(axis=1)

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pictures_of_lights import off_deg, sphere_pictures, ways
+from angles import angles_deg
+from pictures_of_lights import sphere_pictures, ways
 
 from psvideo.cli.app import main
 from psvideo.cli.options.typed import parse_box, parse_seconds, parse_starts_s
@@ -64,7 +65,7 @@ def test_a_circle_beside_the_ball_is_named_and_not_believed(
         known = {light.name: light.direction for light in read_rig(shot[1]).lights}
         for light in read_rig(rig).lights:
             assert light.direction is not None
-            off = off_deg(np.array(light.direction), np.array(known[light.name]))
+            off = angles_deg(np.array(light.direction), np.array(known[light.name]))
             assert off < 3 * (light.error_deg or 0)
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pictures_of_lights import HIGH, WIDE, Array, off_deg, sphere_pictures, ways
+from angles import angles_deg
+from pictures_of_lights import HIGH, WIDE, Array, sphere_pictures, ways
 
 import psvideo as ps
 from psvideo.calibrate.cho2020 import measure_strengths
@@ -180,7 +181,7 @@ def test_the_command_writes_the_strengths_into_the_rig_and_speaks_json(
     assert [light["name"] for light in spoken] == [light.name for light in written] == list("abcde")
     found = np.array([light.intensity for light in written])
     np.testing.assert_allclose(found, strengths / strengths.mean(axis=0), rtol=0.02)
-    assert off_deg(np.array([light.direction for light in written]), directions).max() < 1e-3
+    assert angles_deg(np.array([light.direction for light in written]), directions).max() < 1e-3
     assert main(words) == 2, "a rig is not replaced without --force"
     assert main([*words, "--force"]) == 0
     assert "5 lights written; intensities are relative" in capsys.readouterr().out

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
+from angles import angles_deg
+from bench.mirror_scene import Ball, Lamp, Lens, photograph
 
 from psvideo.cli.app import main
 from psvideo.formats.rig_toml import read_rig
@@ -22,7 +23,7 @@ LENS = Lens(width=200, height=200, focal=600.0)
 
 
 def angle_deg(one: tuple[float, float, float], other: tuple[float, float, float]) -> float:
-    return float(np.degrees(np.arccos(unit(np.asarray(one)) @ unit(np.asarray(other)))))
+    return float(angles_deg(one, other))
 
 
 def filmed(folder: Path, directions: Mapping[str, tuple[float, float, float]]) -> str:

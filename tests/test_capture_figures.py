@@ -46,7 +46,7 @@ def paper_plan(
     return Plan(camera=camera, flashes=flashes, dark_s=dark_s, mode=mode, dark_every=dark_every)
 
 
-def test_equations_1_5_and_6_with_the_paper_s_numbers() -> None:
+def test_equations_1_5_and_6_give_the_paper_s_numbers() -> None:
     plan = paper_plan(200e-6)
     figures = shoot_figures(plan)
     assert figures.cycle_s == pytest.approx(200e-6 + 1 / 60)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from filmed_rounds import angle_deg
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import thin
@@ -46,12 +47,6 @@ def surface(
         albedo=np.asarray(length, np.float32),
         valid=np.ones((ROWS, COLS), np.bool_),
     )
-
-
-def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    angles: np.ndarray = np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1)))
-    return angles
 
 
 def run(surfaces: list[Surface], results: int, noise: ResultNoise | None = None) -> list[Surface]:

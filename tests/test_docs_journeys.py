@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from angles import angles_deg
 from nuke_reader import picture_of, read_script
 from numpy.typing import NDArray
 from PIL import Image
@@ -53,7 +54,7 @@ def pixels(file: Path) -> Array:
 
 def mean_error_deg(found: Array, true: Array, where: NDArray[np.bool_]) -> float:
     assert where.sum() > 300
-    return float(np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))[where].mean())
+    return float(angles_deg(found, true)[where].mean())
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_twelve_stills_to_a_relit_web_page(here: Path) -> None:
+def test_twelve_stills_become_a_relit_web_page(here: Path) -> None:
     stills = (ROOT / "docs" / "stills.md").read_text(encoding="utf-8")
     assert "psvideo stills photos/ --lights lights.lp -o out/\npsvideo view out/ --export relit.html\n" in stills
     names = [f"IMG_{number}.JPG" for number in (4, 5, 7, 8, 12, 19, 20, 21, 30, 31, 100, 101)]
@@ -183,7 +184,7 @@ def upright(vectors: Any) -> Any:
     return np.stack([vectors[..., 1], -vectors[..., 0], vectors[..., 2]], axis=-1)
 
 
-def test_a_phones_hlg_movie_to_upright_normals(clip: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_phones_hlg_movie_becomes_upright_normals(clip: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shot = open_clip(clip)
     as_a_phone_writes(here / "take.mov", [frame.image.astype(np.float64) for frame in read_frames(shot)])
     plan = replace(shot.plan, camera=replace(shot.plan.camera, encoding=Encoding(transfer="hlg")))
@@ -203,7 +204,7 @@ def test_a_phones_hlg_movie_to_upright_normals(clip: Path, here: Path, capsys: p
     assert mean_error_deg(found, upright(true), solid) < 2
 
 
-def test_a_clip_to_blender(clip: Path, here: Path) -> None:
+def test_a_clip_is_handed_to_blender(clip: Path, here: Path) -> None:
     shutil.copytree(clip, here / "clip")
     travel("A clip to Blender")
     assert {"psvideo_import.zip", "delivery.json", "README-blender.txt"} <= {
@@ -212,7 +213,7 @@ def test_a_clip_to_blender(clip: Path, here: Path) -> None:
     assert len(list((here / "out" / "normals_png16").iterdir())) == len(list((here / "out" / "normals").iterdir()))
 
 
-def test_a_clip_to_nuke(clip: Path, here: Path) -> None:
+def test_a_clip_is_handed_to_nuke(clip: Path, here: Path) -> None:
     shutil.copytree(clip, here / "clip")
     travel("A clip to Nuke")
     script = here / "out" / "clip.nk"

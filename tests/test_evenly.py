@@ -23,7 +23,7 @@ def faces() -> np.ndarray:
     return apart
 
 
-def test_each_of_two_faces_changed_by_its_own_amount_up_to_their_edge() -> None:
+def test_each_of_two_faces_is_changed_by_its_own_amount_up_to_their_edge() -> None:
     shading, left = told(faces())
     assert np.abs(shading[:, :33] - 12).max() < 1
     assert np.abs(shading[:, 33:] + 20).max() < 1

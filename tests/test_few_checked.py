@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from angles import angles_deg
 from numpy.typing import NDArray
 from ring_and_ball import ring
 
@@ -53,16 +54,12 @@ def under(ways: Array) -> Illumination:
     return Illumination(directions=ways, intensities=np.ones((len(ways), 1)))
 
 
-def off_deg(found: NDArray[np.floating], truth: Array) -> Array:
-    return np.asarray(np.degrees(np.arccos(np.clip((found.astype(np.float64) * truth).sum(axis=-1), -1, 1))))
-
-
 def solved(shade: Callable[[Array, Array], Array], noise: float = 0.001) -> tuple[Surface, Array]:
     """Return what the four lights say of the ball, and by how much it is off where it was measured, else 0."""
     normals, inside = ball()
     found = Solving(error=True).solve(shot(normals, FOUR, shade, noise), under(FOUR), mask=inside)
     assert found.source is not None
-    return found, np.where(found.source == MEASURED, off_deg(found.normals, normals), 0)
+    return found, np.where(found.source == MEASURED, angles_deg(found.normals, normals), 0)
 
 
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,7 +120,7 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
         normals=g / np.linalg.norm(g, axis=1, keepdims=True),
     )
     turned = few_checked.model_turns_deg(points, g)
-    off = off_deg(g / np.linalg.norm(g, axis=1, keepdims=True), truth)
+    off = angles_deg(g / np.linalg.norm(g, axis=1, keepdims=True), truth)
     assert off.mean() > 3
     assert 0.5 < turned.mean() / off.mean() < 2
     flat = SubjectPoints(

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from angles import angles_deg
 from ring_and_ball import ring
 
 import psvideo as ps
@@ -42,11 +43,6 @@ def plates_of(
 
 def lit_by(lights: np.ndarray = LIGHTS) -> Illumination:
     return Illumination(directions=lights, intensities=np.ones((len(lights), 3)))
-
-
-def angles_deg(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    apart = np.linalg.norm(found.astype(np.float64) - truth, axis=-1)
-    return np.asarray(np.degrees(2 * np.arcsin(np.clip(apart / 2, 0, 1))))
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from angles import angles_deg
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
@@ -25,8 +26,7 @@ def planes(path: Path) -> np.ndarray:
 
 
 def mean_error_deg(found: np.ndarray, true: np.ndarray, where: np.ndarray) -> float:
-    cosine = np.clip((found * true).sum(axis=-1), -1, 1)
-    return float(np.degrees(np.arccos(cosine))[where].mean())
+    return float(angles_deg(found, true)[where].mean())
 
 
 def digest(folder: Path) -> dict[str, str]:
@@ -49,7 +49,9 @@ def run(*arguments: object) -> int:
     return main([str(argument) for argument in arguments])
 
 
-def test_from_a_scene_to_normals(clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_is_filmed_and_solved_to_its_own_normals(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = digest(clip)
     out = tmp_path / "out"
     assert run("normals", clip, "--rig", clip / "rig.toml", "-o", out) == 0

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from angles import angles_deg
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -79,11 +80,6 @@ def solved(plates: NDArray[np.floating], lights: Array, *, metal: bool = True) -
     return Solving(error=True, metal=metal).solve([*plates.astype(np.float32)], under(lights))
 
 
-def off_deg(found: NDArray[np.floating], truth: NDArray[np.floating]) -> Array:
-    """Angles between unit normals."""
-    return np.asarray(np.degrees(np.arccos(np.clip((found * truth).sum(axis=-1), -1, 1))))
-
-
 def found_in(plates: Array, lights: Array) -> Metal | None:
     """What a subject shows as metal."""
     look = Solving().look(LitPlates([*plates.astype(np.float32)], under(lights)))
@@ -105,9 +101,9 @@ def test_metal_is_solved_by_its_highlights(
     truth = bumps()
     plates = shot(truth, lights, material, kind)
     as_metal, as_matte = (solved(plates, lights, metal=metal) for metal in (True, False))
-    off = off_deg(as_metal.normals, truth)
+    off = angles_deg(as_metal.normals, truth)
     assert off.mean() < most_deg
-    assert off_deg(as_matte.normals, truth).mean() > 2.5 * off.mean()
+    assert angles_deg(as_matte.normals, truth).mean() > 2.5 * off.mean()
     assert as_metal.error_deg is not None
     assert (off <= as_metal.error_deg).mean() > 0.6
     assert (off <= 2 * as_metal.error_deg).mean() > 0.9
@@ -174,7 +170,7 @@ def test_of_a_machine_only_the_metal_is_solved_as_metal() -> None:
     metal, paint = shot(truth, TWELVE, BRONZE, "ward"), shot(truth, TWELVE, MATTE)
     left = np.arange(SIZE) < SIZE // 2
     plates = np.where(left, paint, metal)
-    found, without = (off_deg(solved(plates, TWELVE, metal=on).normals, truth) for on in (True, False))
+    found, without = (angles_deg(solved(plates, TWELVE, metal=on).normals, truth) for on in (True, False))
     assert found[:, ~left].mean() < 0.5 * without[:, ~left].mean()
     assert found[:, left].mean() < 1
 
@@ -187,9 +183,9 @@ def test_a_take_shares_what_was_found_of_its_metal() -> None:
     known = Subject(reflectance=None, metal=metal_of([look]))
     assert known.metal is not None
     again = Solving(error=True, subject=known).solve([*plates], lit)
-    assert off_deg(again.normals, alone.normals).mean() < 0.1
+    assert angles_deg(again.normals, alone.normals).mean() < 0.1
     matte = Solving(subject=Subject(reflectance=None)).solve([*plates], lit)
-    assert off_deg(matte.normals, bumps()).mean() > 2 * off_deg(again.normals, bumps()).mean()
+    assert angles_deg(matte.normals, bumps()).mean() > 2 * angles_deg(again.normals, bumps()).mean()
 
 
 @given(st.floats(0, 50), st.floats(0, 360), st.integers(2, 6), st.floats(0.05, 0.5), st.floats(0.01, 100))
@@ -209,7 +205,7 @@ def test_a_normal_is_found_under_known_lobes_whatever_its_scale(
     left = np.empty(1)
     fill_unlike(scale * shown, np.ones((12, 1)), again, left)
     assert left[0] < 1e-4
-    assert off_deg(found, normal)[0] < 1.5
+    assert angles_deg(found, normal)[0] < 1.5
 
 
 def ways(lights: Array, points: int) -> tuple[Array, Array]:
@@ -234,7 +230,7 @@ def test_least_squares_finds_the_normals_of_matte_plates_again() -> None:
         known = lit[:, point] > 0
         g, *_ = np.linalg.lstsq(TWELVE[known], matte[known, point], rcond=None)
         left = matte[known, point] - TWELVE[known] @ g
-        assert off_deg(g / np.linalg.norm(g), normals[point]) < 1.5
+        assert angles_deg(g / np.linalg.norm(g), normals[point]) < 1.5
         assert np.abs(left).max() > 0
 
 

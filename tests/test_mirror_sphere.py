@@ -269,7 +269,7 @@ def _psbox_errors(psbox: Path, found: MirrorCalibration) -> tuple[np.ndarray, np
     return np.array(errors), np.array([light.error_deg for light in lights])
 
 
-def test_the_psbox_sphere_with_its_hand_made_circle(psbox: Path, tmp_path: Path) -> None:
+def test_the_psbox_sphere_shows_its_lights_in_its_hand_made_circle(psbox: Path, tmp_path: Path) -> None:
     errors, own = _psbox_errors(psbox, mirror_sphere([psbox], out=tmp_path / "rig.toml", circle=[PSBOX_CIRCLE]))
     assert (errors < 0.5).all()
     assert np.sqrt((errors**2).mean()) < np.sqrt((own**2).mean())
@@ -394,7 +394,7 @@ def test_a_circle_that_is_far_off_the_ball_gives_no_rig(circle: tuple[float, flo
         calibrate_lights(sight_spheres([pictures], looking, where="ball"))
 
 
-def test_the_chrome_sphere_of_washington(shared_data: Path, tmp_path: Path) -> None:
+def test_the_chrome_sphere_of_washington_shows_its_lights(shared_data: Path, tmp_path: Path) -> None:
     out = tmp_path / "rig.toml"
     assert main(["calibrate", "mirror-sphere", str(shared_data / "uw_psm" / "chrome"), "-o", str(out), "-q"]) == 0
     assert read_picture(out.with_suffix(".png")).shape[1] == 1200

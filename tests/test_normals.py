@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from angles import error_deg
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -34,15 +35,6 @@ def shoot(normals: Array, lit: Illumination, albedo: Array | float = 0.43) -> ND
         return grey
     coloured: NDArray[np.float32] = (shade[..., None] * lit.intensities[:, None, None, :] * albedo).astype(np.float32)
     return coloured
-
-
-def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = None) -> Array:
-    """Angles between the normals and the true ones, where both are valid."""
-    both = surface.valid if where is None else surface.valid & where
-    found = surface.normals[both].astype(np.float64)
-    found /= np.linalg.norm(found, axis=-1, keepdims=True)
-    angles: Array = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth[both], axis=-1) / 2, 0, 1)))
-    return angles
 
 
 @pytest.mark.parametrize("channels", [1, 3])

@@ -8,21 +8,14 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from angles import error_deg
 from numpy.typing import NDArray
 from picture_file import read_picture
 
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import EVERYTHING, Usable, solve
 from psvideo.solve.normals.lit_plates import LitPlates
-
-
-def error_deg(surface: Surface, truth: NDArray[np.floating], mask: NDArray[np.bool_]) -> NDArray[np.float64]:
-    both = surface.valid & mask
-    cosine = np.sum(surface.normals[both].astype(np.float64) * truth[both], axis=-1)
-    angles: NDArray[np.float64] = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    return angles
 
 
 def test_the_ball_of_diligent_with_48_lights(shared_data: Path) -> None:
@@ -45,7 +38,7 @@ def test_the_ball_of_diligent_with_48_lights(shared_data: Path) -> None:
     assert error_deg(careful, truth, mask).mean() <= 3.3
 
 
-def test_the_rendered_bunny_with_cast_shadows(shared_data: Path) -> None:
+def test_the_rendered_bunny_is_solved_though_it_casts_shadows_on_itself(shared_data: Path) -> None:
     data = np.load(shared_data / "bunny_rendered" / "bunny_lambert.npz")
     plates = list(data["images"].astype(np.float32) * 5)
     lit = Illumination(directions=data["lights"].astype(np.float64), intensities=np.ones((len(plates), 3)))
@@ -58,7 +51,7 @@ def test_the_rendered_bunny_with_cast_shadows(shared_data: Path) -> None:
     assert np.percentile(error_deg(careful, data["normal_gt"], data["mask"]), 95) < 6.5 < np.percentile(plain, 95)
 
 
-def test_the_matte_sphere_of_washington(shared_data: Path) -> None:
+def test_the_matte_sphere_of_washington_comes_out_as_a_sphere(shared_data: Path) -> None:
     folder = shared_data / "uw_psm"
     words = (folder / "lights.txt").read_text().split()
     directions = np.array(words[1:], np.float64).reshape(int(words[0]), 3)

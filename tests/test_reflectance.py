@@ -6,6 +6,7 @@ from fractions import Fraction
 import numba
 import numpy as np
 import pytest
+from angles import angles_deg
 from numpy.typing import NDArray
 from ring_and_ball import ring
 
@@ -73,11 +74,6 @@ def distant() -> tuple[Illumination, Array]:
     return lit, 1.2 * np.broadcast_to(WAYS[:, None, None], (len(WAYS), SIZE, SIZE, 3))
 
 
-def off_deg(found: NDArray[np.floating], truth: Array) -> Array:
-    cosines = np.clip((found.astype(np.float64) * truth).sum(axis=-1), -1, 1)
-    return np.asarray(np.degrees(np.arccos(cosines)))
-
-
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(huber1981, "points_of", lambda *_, **__: None)
 
@@ -88,11 +84,11 @@ def test_a_sheen_that_the_whole_subject_has_turns_no_normal(monkeypatch: pytest.
     plates = shot(normals, sent, gloss=0.15)
     found = Solving(error=True).solve(plates, lit)
     assert found.valid.mean() > 0.99
-    off = off_deg(found.normals, normals)
+    off = angles_deg(found.normals, normals)
     albedo = found.albedo[found.valid].mean(axis=0)
     np.testing.assert_allclose(albedo, [0.55, 0.45, 0.35], atol=0.03)
     without_model(monkeypatch)
-    before = off_deg(Solving().solve(plates, lit).normals, normals)
+    before = angles_deg(Solving().solve(plates, lit).normals, normals)
     assert off.mean() < 0.35 * before.mean()
     assert off.mean() < 0.4
 
@@ -110,9 +106,9 @@ def test_five_lights_that_stand_elsewhere_than_the_rig_says_pass_for_no_sheen_an
     across -= (across * FIVE).sum(axis=1, keepdims=True) * FIVE
     claimed = FIVE + np.tan(np.radians(wrong_deg)) * across / np.linalg.norm(across, axis=1, keepdims=True)
     claimed /= np.linalg.norm(claimed, axis=1, keepdims=True)
-    off = off_deg(Solving().solve(plates, under(claimed)).normals, normals)
+    off = angles_deg(Solving().solve(plates, under(claimed)).normals, normals)
     without_model(monkeypatch)
-    before = off_deg(Solving().solve(plates, under(claimed)).normals, normals)
+    before = angles_deg(Solving().solve(plates, under(claimed)).normals, normals)
     assert off.mean() <= 1.02 * before.mean()
 
 
@@ -121,9 +117,9 @@ def test_the_matte_part_of_a_subject_stays_matte(monkeypatch: pytest.MonkeyPatch
     normals = waves()
     half = np.arange(SIZE) < SIZE // 2
     plates = shot(normals, sent, gloss=np.where(half, 0.15, np.zeros((SIZE, SIZE))))
-    off = off_deg(Solving().solve(plates, lit).normals, normals)
+    off = angles_deg(Solving().solve(plates, lit).normals, normals)
     without_model(monkeypatch)
-    before = off_deg(Solving().solve(plates, lit).normals, normals)
+    before = angles_deg(Solving().solve(plates, lit).normals, normals)
     assert off[:, half].mean() < 0.8 * before[:, half].mean()
     assert off[:, ~half].mean() <= 1.05 * before[:, ~half].mean()
 
@@ -171,9 +167,9 @@ def under(ways: Array) -> Illumination:
 def test_clay_turns_no_normal(monkeypatch: pytest.MonkeyPatch, ways: Array, most_deg: float) -> None:
     normals = waves()
     plates = clay(normals, ways, roughness=0.6)
-    off = off_deg(Solving().solve(plates, under(ways)).normals, normals)
+    off = angles_deg(Solving().solve(plates, under(ways)).normals, normals)
     without_model(monkeypatch)
-    before = off_deg(Solving().solve(plates, under(ways)).normals, normals)
+    before = angles_deg(Solving().solve(plates, under(ways)).normals, normals)
     assert off.mean() < 0.5 * before.mean()
     assert off.mean() < most_deg
 
@@ -181,9 +177,9 @@ def test_clay_turns_no_normal(monkeypatch: pytest.MonkeyPatch, ways: Array, most
 def test_what_is_matte_beside_clay_stays_matte(monkeypatch: pytest.MonkeyPatch) -> None:
     normals, rough = waves(), np.arange(SIZE) < 0.75 * SIZE
     plates = clay(normals, WAYS, roughness=np.where(rough, 0.6, np.zeros((SIZE, SIZE))))
-    off = off_deg(Solving().solve(plates, under(WAYS)).normals, normals)
+    off = angles_deg(Solving().solve(plates, under(WAYS)).normals, normals)
     without_model(monkeypatch)
-    before = off_deg(Solving().solve(plates, under(WAYS)).normals, normals)
+    before = angles_deg(Solving().solve(plates, under(WAYS)).normals, normals)
     assert off[:, rough].mean() < 0.8 * before[:, rough].mean()
     assert off[:, ~rough].mean() <= 1.05 * before[:, ~rough].mean()
 
@@ -201,7 +197,7 @@ def test_beside_the_lens_axis_gloss_and_clay_turn_no_normal(material: str) -> No
     far_away = Rig(lights=tuple(lamps))
     lens = replace(far_away, focal_px=BESIDE_THE_AXIS.focal_px, principal_px=BESIDE_THE_AXIS.principal_px)
     before, found = (solve_images(plates, rig, saturation=np.inf) for rig in (far_away, lens))
-    off, off_before = (off_deg(one.normals, normals).mean() for one in (found, before))
+    off, off_before = (angles_deg(one.normals, normals).mean() for one in (found, before))
     assert off < 0.5
     assert off < 0.25 * off_before
     assert found.valid.mean() > 0.99
@@ -355,7 +351,7 @@ def test_a_subject_that_is_known_is_solved_as_one_that_was_found() -> None:
     assert again.albedo.tobytes() == alone.albedo.tobytes()
     assert matte.misfit is not None
     assert matte.misfit.reflectance is None
-    assert off_deg(matte.normals, waves()).mean() > 2 * off_deg(alone.normals, waves()).mean()
+    assert angles_deg(matte.normals, waves()).mean() > 2 * angles_deg(alone.normals, waves()).mean()
 
 
 def test_what_one_look_at_a_subject_cannot_show_another_does() -> None:

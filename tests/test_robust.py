@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from angles import angles_deg, error_deg
 from numpy.typing import NDArray
 from ring_and_ball import ball, ring
 from scipy.optimize import linprog  # type: ignore[attr-defined]
 
 import psvideo as ps
 from psvideo.cli.app import main
-from psvideo.model.surface import Misfit, Surface
+from psvideo.model.surface import Misfit
 from psvideo.report.judge.of_accuracy import accuracy
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
@@ -52,18 +53,6 @@ def shoot(normals: Array, lit: Illumination, albedo: Array | float = 0.6) -> Pla
     return list((shade[..., None] * lit.intensities[:, None, None, :] * albedo).astype(np.float32))
 
 
-def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = None) -> Array:
-    """Angles between the normals and the true ones, where both are valid."""
-    return angles_deg(surface.normals[both := surface.valid if where is None else surface.valid & where], truth[both])
-
-
-def angles_deg(found: NDArray[np.floating], truth: Array) -> Array:
-    found = found.astype(np.float64)
-    found = found / np.linalg.norm(found, axis=-1, keepdims=True)
-    angles: Array = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth, axis=-1) / 2, 0, 1)))
-    return angles
-
-
 @pytest.fixture(scope="module")
 def gloss() -> tuple[Plates, Illumination, Array]:
     """The scene of gloss and cast shadows under its eight lights, clipped at 1.0."""
@@ -92,7 +81,7 @@ def test_a_matte_ball_comes_out_exactly(lights: int, channels: int, loss: str) -
     assert np.isfinite(surface.normals).all()
 
 
-def test_one_normal_from_three_channels_of_any_colours() -> None:
+def test_three_channels_of_any_colours_give_one_normal() -> None:
     normals, inside = ball(reach_deg=60)
     lit = lit_by(ring(8, 40), channels=3)
     red = shoot(normals, lit, np.array([0.6, 0.0, 0.0]))

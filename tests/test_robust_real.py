@@ -97,7 +97,7 @@ def test_the_predicted_error_of_the_ball_covers_the_true_one(ball: Subject) -> N
     assert np.mean(true <= 2 * predicted) >= 0.95
 
 
-def test_the_rendered_bunny_with_cast_shadows(shared_data: Path) -> None:
+def test_shadows_that_the_rendered_bunny_casts_on_itself_are_left_out(shared_data: Path) -> None:
     data = np.load(shared_data / "bunny_rendered" / "bunny_lambert.npz")
     lit = Illumination(directions=data["lights"].astype(np.float64), intensities=np.ones((len(data["lights"]), 3)))
     bunny = Subject(list(data["images"].astype(np.float32) * 5), lit, data["normal_gt"], data["mask"])

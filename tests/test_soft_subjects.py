@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from angles import angles_deg
 from numpy.typing import NDArray
 from ring_and_ball import ball, ring
 
@@ -49,8 +50,7 @@ def under(ways: Array) -> Illumination:
 
 
 def off_deg(found: Surface, truth: Array, where: NDArray[np.bool_]) -> Array:
-    cosines = (found.normals[where].astype(np.float64) * truth[where]).sum(axis=-1)
-    return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1, 1))))
+    return angles_deg(found.normals[where], truth[where])
 
 
 @pytest.mark.parametrize(("ways", "share"), [(UNEVEN, 0.1), (UNEVEN, 0.3), (FIVE, 0.2)], ids=["eight", "wax", "five"])

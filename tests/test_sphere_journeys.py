@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from angles import angles_deg
 
 from psvideo.calibrate.mirror.sighting import Sighting
 from psvideo.calibrate.sphere.outline import given_outline
@@ -54,7 +55,7 @@ def normals_error(subject: Path, rig: Path, out: Path) -> float:
     valid = pixels(out / "valid" / file.name.replace("normals", "valid")) > 0
     where = valid & (pixels(subject / "truth" / "mask.exr") > 0.5)
     assert where.mean() > 0.1
-    return float(np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))[where].mean())
+    return float(angles_deg(found, true)[where].mean())
 
 
 def test_a_chrome_ball_in_a_strobed_clip_shows_the_lights_with_which_normals_come_out_right(

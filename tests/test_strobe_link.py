@@ -212,7 +212,7 @@ def test_the_reader_gives_the_same_lines_however_the_bytes_are_cut(data: bytes, 
         (b"x" * 5000 + b"\n", TextLine(text="", fault=Error.LONG)),
     ],
 )
-def test_lines_as_the_page_has_them(data: bytes, expected: TextLine) -> None:
+def test_lines_are_read_as_the_page_has_them(data: bytes, expected: TextLine) -> None:
     assert list(LineReader(LONGEST_REQUEST).feed(b"\n\r\n" + data)) == [expected]
 
 

@@ -84,7 +84,7 @@ def play_plan(
 
 
 @pytest.mark.parametrize("board", toolchain.AVR_BOARDS)
-def test_from_a_plan_through_the_firmware_to_normals(
+def test_a_plan_that_the_firmware_plays_ends_in_right_normals(
     board: toolchain.AvrBoard, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene, plan, trace = tmp_path / "scene.toml", tmp_path / "plan.toml", tmp_path / "trace.csv"

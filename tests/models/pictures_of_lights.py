@@ -45,11 +45,6 @@ def sphere_pictures(
     return light_pictures(names, list(np.clip(images, 0, 1).astype(np.float32)))
 
 
-def off_deg(found: Array, true: Array) -> Array:
-    angles: Array = np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))
-    return angles
-
-
 def washington(folder: Path, into: Path) -> tuple[Path, Array]:
     into.mkdir()
     for n in range(12):

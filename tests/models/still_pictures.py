@@ -5,6 +5,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from angles import angles_deg
 from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
@@ -67,7 +68,7 @@ def error_deg(out: Path) -> float:
     normals = decode("exr", next((out / "normals").glob("*.exr"))).codes.astype(np.float64)
     true, _ = ball()
     middle = true[..., 2] > 0.3
-    return float(np.degrees(np.arccos(np.clip((normals * true).sum(axis=-1), -1, 1)))[middle].mean())
+    return float(angles_deg(normals, true)[middle].mean())
 
 
 def remarks(report: object) -> str:
