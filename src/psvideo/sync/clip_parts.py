@@ -34,6 +34,8 @@ def parts_of(plan: Plan, rows: Profiles, verdict: Verdict) -> list[tuple[slice, 
        fit that is believed or refused.
     """
     whole, believed = verdict.found, verdict.believed
+    if verdict.placed:  # by one place in the cycle for all frames: what does not fit is the subject
+        return []
     may = may_restart(plan, rows, whole)
     if believed and not may and not dark_within(whole):
         return []

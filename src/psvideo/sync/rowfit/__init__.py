@@ -13,4 +13,6 @@ Rooms, in the order in which a fit goes through them:
 - ``coarse``: where the strobe may be, searched from nothing
 - ``tracking``: one course of the strobe through the whole take
 - ``unknowns``: what else may be free besides the times, where the data call for it
+
+Beside them, ``whatever_moves`` finds the strobe where a subject is too fast for a fit: it asks no brightness to stay.
 """

@@ -14,6 +14,7 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.rowfit.standard_error import freedom
 from psvideo.sync.rowfit.tracking.course import too_many
+from psvideo.sync.rowfit.whatever_moves import contradicts, placed_fit, sure_place
 from psvideo.sync.verdict.elsewhere import fits_elsewhere
 from psvideo.sync.verdict.few_kinds import shows_the_same
 from psvideo.sync.verdict.refusal import MOST_PPM
@@ -65,17 +66,20 @@ FLASHES_DIFFER = 0.7
 class Verdict:
     """A fit, the plan under which it was made (another camera than the given plan's where that was wrong by far), and
     whether it is to be believed. ``seed`` is where the given plan's strobe was looked for first. ``other``: flashes at
-    other times that explain the clip as well."""
+    other times that explain the clip as well. ``placed``: it was found by what holds
+    whatever moves."""
 
     plan: Plan
     found: ClipFit
     believed: bool
     seed: Seed
     other: Beat | None = None
+    placed: bool = False
 
 
 def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
-    """Return the best fit of a clip under the plan or, where another shutter or readout is far likelier, under that.
+    """Return the best fit of a clip under the plan or, where another shutter or readout is far likelier, under that;
+    where it is doubtful and contradicts what holds whatever moves, the place that this shows.
 
     ``rows`` are laid out from the picture's top row.
     """
@@ -83,6 +87,19 @@ def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
     seed = found.seed
     if not doubtful(plan, found):
         return _unless_elsewhere(Verdict(plan=plan, found=found, believed=True, seed=seed))
+    place = sure_place(plan, rows)
+    if place is None:
+        return _of_rivals(plan, rows, found)
+    if not contradicts(plan, found, place):
+        verdict = _of_rivals(plan, rows, found)
+        if verdict.believed:
+            return verdict
+    return Verdict(plan=plan, found=placed_fit(plan, rows, place), believed=True, seed=seed, placed=True)
+
+
+def _of_rivals(plan: Plan, rows: Profiles, found: ClipFit) -> Verdict:
+    """Return the fit of a plan, which is doubtful, or that of the plan that was meant; whether others explain more."""
+    seed = found.seed
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found) and not _feigned(plan, found)
     if believed:
