@@ -1,5 +1,6 @@
 """What is said of rows, frames, times and motion: which were seen, which are missing, and what is to blame."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,7 @@ from psvideo.model.rows.recipe import LEAST_SHARE
 from psvideo.model.timing import DroppedFrames
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
+from psvideo.plates.sequence import Round
 from psvideo.report.html import _timing
 from psvideo.report.judge import of_motion, of_rows, of_steadiness, of_timing
 from psvideo.report.judge.of_frames import frame_light
@@ -277,3 +279,20 @@ def test_a_missing_frame_costs_its_rounds_and_not_the_take(spoilt: int, rounds: 
     assert graded(lines, "rows") == grade
     assert graded(lines, "frames") == "doubtful"
     assert not any("360" in line.advice for line in lines)
+
+
+@pytest.mark.parametrize(("radius", "words"), [(15, "All that is lit moves"), (60, "1[0-3] % of the picture moves")])
+def test_how_much_moves_is_no_share_of_the_picture_where_only_what_is_lit_shows_it(radius: int, words: str) -> None:
+    """A disc of 0.6 % of the picture, before the dark, was "100 % of the picture"; one of 9 % sweeps 11."""
+    rng = np.random.default_rng(4)
+    paint = rng.uniform(0.2, 0.8, (300, 400)).astype(np.float32)
+    y, x = np.mgrid[:300, :400]
+    disc = np.where(np.hypot(y - 150, x - 200) < radius, paint, 0)
+    one, seen = Observed(lights=("a",)), np.ones(300, np.bool_)
+    for number in range(4):
+        image = np.roll(disc, 3 * number, 1) + rng.normal(0, 0.001, disc.shape)
+        picture = mixture_of(image.astype(np.float32))
+        plate = LightPlate(light="a", number=number, time_s=float(number), picture=picture, seen=seen)
+        one.add(Round(number=number, plates=(plate,)))
+    found = of_motion.motion(plan_of(one.lights, fps=1), timing_of(frame_period_s=1.0), one).found
+    assert re.match(words, found)

@@ -15,6 +15,8 @@ FAST_PX, LOST_PX = 1.0, 4.0
 """Pixels from flash to flash: 1 costs about 1 degree, 4 cost 5 to 9."""
 FEW_MOVE, MUCH_CHANGES = 0.02, 0.1
 """Shares of the picture: fewer that move fast spoil no take; more that change and cannot be followed do."""
+ALL = 0.995
+"""A larger share is all of the picture that can be seen to move."""
 OFTEN = 0.9
 """Motion is judged by what is reached in a tenth of the rounds."""
 LEAST_FOLLOWED = 0.5
@@ -43,7 +45,7 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
     return Judgement(
         subject="motion",
         grade="bad" if grave else "doubtful",
-        found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
+        found=f"{_what_moves(share)} moves, by up to {step_px:.1f} px from flash to flash "
         f"({blur_px:.1f} px of blur within one){_cost(step_px, observed, aligned=aligned)}."
         + _unfrozen(plan, timing, observed, speed),
         advice="Move slower, raise the frame rate or flash fewer lights"
@@ -61,6 +63,12 @@ def apart_in_round_px(plan: Plan, timing: Timing, observed: Observed) -> float:
 def _flash_s(plan: Plan, timing: Timing) -> float:
     """Return the time from flash to flash."""
     return timing.frame_period_s if plan.mode == "synced" else plan.cycle_s / len(plan.cycle_slots)
+
+
+def _what_moves(share: float) -> str:
+    """Say how much moves. Where a picture shifts as a whole, that is known of what is lit: what is dark is alike
+    wherever it goes, and a small subject before it would be called 100 % of the picture."""
+    return "All that is lit" if share > ALL else f"{100 * share:.0f} % of the picture"
 
 
 def _cost(step_px: float, observed: Observed, *, aligned: bool) -> str:
