@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from psvideo.plates.align.velocity import all_lights
+from psvideo.plates.align.velocity import all_lights, between_lights
 from psvideo.plates.align.velocity.between_lights import BetweenLights
 from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.flow import Sketch
@@ -24,27 +24,39 @@ FLASHES_S = ROUND_S / (LIGHTS + 1) * (np.arange(LIGHTS) - (LIGHTS - 1) / 2)
 INNER = np.s_[24:-24, 32:-32]
 
 
-def cloth(light: int, right_px: float) -> np.ndarray:
-    """The codes of a checkered cloth, so far to the right, with the shading of one light and some noise."""
+def cloth(light: int, right_px: float, turned: float = 0.0) -> np.ndarray:
+    """The codes of a checkered cloth, so far to the right or turned about its middle, with the shading of one light and
+    some noise."""
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
-    checks = np.tanh(4 * np.sin(np.pi * (x - right_px) / SQUARE_PX)) * np.tanh(4 * np.sin(np.pi * y / SQUARE_PX))
     shading = 15 * np.cos(light + y / 40) + (20 - 10 * light) * (x / SHAPE[1] - 0.5)
-    noise = np.random.default_rng([light, int(1000 * right_px) % 100_000]).normal(0, 1, SHAPE)
+    x, y = turned_back(x, y, turned)
+    checks = np.tanh(4 * np.sin(np.pi * (x - right_px) / SQUARE_PX)) * np.tanh(4 * np.sin(np.pi * y / SQUARE_PX))
+    noise = np.random.default_rng([light, int(1000 * (right_px + turned)) % 100_000]).normal(0, 1, SHAPE)
     return np.asarray(np.clip(120 + 40 * checks + shading + noise, 0, 255), np.uint8)
 
 
-def sketch(light: int, time_s: float, right_px: float) -> Sketch:
-    codes = cloth(light, right_px)
+def turned_back(x: np.ndarray, y: np.ndarray, radians: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where points lay before the picture turned about its middle."""
+    right, down = x - (SHAPE[1] - 1) / 2, y - (SHAPE[0] - 1) / 2
+    cos, sin = math.cos(radians), math.sin(radians)
+    return cos * right + sin * down + (SHAPE[1] - 1) / 2, cos * down - sin * right + (SHAPE[0] - 1) / 2
+
+
+def sketch(light: int, time_s: float, right_px: float, turned: float = 0.0) -> Sketch:
+    codes = cloth(light, right_px, turned)
     blocks = codes.reshape(SHAPE[0] // 8, 8, SHAPE[1] // 8, 8).mean(axis=(1, 3)).astype(np.float32)
     seen = np.ones((SHAPE[0], 1), np.bool_)
     return Sketch(number=1, time_s=time_s, codes=codes, seen=seen, blocks=blocks, white=1.0)
 
 
-def pairs(way_px: Callable[[float], float]) -> list[Pair]:
-    """Every light's plates before and after the instant 0, of a cloth that goes this way."""
+def pairs(way_px: Callable[[float], float], turn: float = 0.0) -> list[Pair]:
+    """Every light's plates before and after the instant 0, of a cloth that goes this way and turns by so much in a
+    round."""
     times_s = [(time_s - ROUND_S * (time_s > 0), time_s + ROUND_S * (time_s <= 0)) for time_s in FLASHES_S]
     return [
-        Pair(before=sketch(light, one, way_px(one)), after=sketch(light, other, way_px(other)))
+        Pair(
+            before=sketch(light, one, way_px(one), turn * one), after=sketch(light, other, way_px(other), turn * other)
+        )
         for light, (one, other) in enumerate(times_s)
     ]
 
@@ -58,6 +70,29 @@ def test_a_checkered_cloth_at_its_turning_point_goes_nowhere(far: float, at_rest
 def test_a_checkered_cloth_that_slides_is_still_followed() -> None:
     found = followed_at(pairs(lambda time_s: 9 * time_s / ROUND_S), 0.0)
     assert np.abs(found.velocity[0][INNER] - 9 / ROUND_S).mean() < 0.5
+
+
+@pytest.mark.parametrize("turn", [0.25, -0.25])
+def test_a_checkered_cloth_that_turns_is_followed_from_flash_to_flash(turn: float) -> None:
+    """From round to round its corners come to lie nearer to other squares."""
+    found = followed_at(pairs(lambda _: 0.0, turn), 0.0)
+    y, x = (axis.astype(np.float64) for axis in np.mgrid[: SHAPE[0], : SHAPE[1]])
+    true = np.stack([-(y - (SHAPE[0] - 1) / 2), x - (SHAPE[1] - 1) / 2]) * turn / ROUND_S
+    off = np.hypot(*(found.velocity - true))[INNER]
+    assert (off < 2).mean() > 0.9
+
+
+def test_what_steps_from_light_to_light_propose_is_the_true_way_whatever_their_shading() -> None:
+    spans_s = np.array([(-time_s, ROUND_S) if time_s <= 0 else (ROUND_S, time_s) for time_s in FLASHES_S], np.float32)
+    codes = [(cloth(light, 26 * time_s / ROUND_S),) * 2 for light, time_s in enumerate(FLASHES_S)]
+    (velocity,) = BetweenLights.of(codes, spans_s, SHAPE).proposed()
+    assert np.abs(velocity[0][INNER] - 26 / ROUND_S).mean() < 0.5
+    assert np.abs(velocity[1][INNER]).mean() < 0.5
+
+
+def test_lights_of_one_flash_propose_nothing() -> None:
+    codes = [(cloth(light, 0.0),) * 2 for light in range(LIGHTS)]
+    assert BetweenLights.of(codes, np.full((LIGHTS, 2), 0.5, np.float32), SHAPE).proposed() == []
 
 
 @pytest.mark.parametrize("goes_px", [0.0, 9.0, -9.0])
@@ -152,7 +187,7 @@ def test_flows_leave_the_threads_that_write_to_these(
     """Each holds as much as a plate, on top of what is being written."""
     at_a_time, counts, lock = [0], list[int](), threading.Lock()
 
-    def counted(one: np.ndarray, *_: object) -> np.ndarray:
+    def counted(one: np.ndarray, *_: object, **__: object) -> np.ndarray:
         with lock:
             at_a_time[0] += 1
             counts.append(at_a_time[0])
@@ -162,7 +197,8 @@ def test_flows_leave_the_threads_that_write_to_these(
         return np.zeros((*one.shape, 2), np.float32)
 
     monkeypatch.setenv("PSVIDEO_THREADS", threads)
-    monkeypatch.setattr(all_lights, "flow_from", counted)
+    for room in (all_lights, between_lights):
+        monkeypatch.setattr(room, "flow_from", counted)
     followed_at(pairs(lambda time_s: 9 * time_s / ROUND_S), 0.0)
     assert len(counts) > 1
     assert max(counts) <= most

@@ -13,11 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.eight_lanes import EIGHT
-from psvideo.compute.threads import WRITING_THREADS, over_ranges, thread_count
+from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.correlation import displacements
 from psvideo.plates.align.velocity.detail import FINEST_PX, detail_of, smoothed
-from psvideo.plates.align.velocity.flow import FINE_PIXELS, comparable, flow_from, pixel_places
+from psvideo.plates.align.velocity.flow import (
+    FINE_PIXELS,
+    comparable,
+    evenly_spread,
+    flow_from,
+    flow_threads,
+    pixel_places,
+)
 from psvideo.plates.align.velocity.followed import Pair, mean_over, odd_width
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
@@ -128,7 +135,7 @@ class AllLights:
 
     def proposed(self) -> list[Floats]:
         """Return the velocities that flow proposes: both ways of few lights, one way of each of more."""
-        chosen = _spread(self.count, MOST_FLOWS)
+        chosen = evenly_spread(self.count, MOST_FLOWS)
         ways = [(light, bool(n % 2)) for n, light in enumerate(chosen)]
         if len(chosen) <= MOST_FLOWS // 2:
             ways = [(light, back) for light in chosen for back in (False, True)]
@@ -138,7 +145,7 @@ class AllLights:
         """Return velocities of what moved farther than flow reaches by itself."""
         pairs = (tuple(map(smoothed, pair)) for pair in self.codes)
         found = displacements(pairs, self.codes[0][0].shape, FAR)
-        some = _spread(self.count, MOST_FLOWS // FAR)
+        some = evenly_spread(self.count, MOST_FLOWS // FAR)
         constant = [np.empty((2, *self.shape), np.float32) for _ in found]
         for plane, (x, y) in zip(constant, found, strict=True):
             plane[0], plane[1] = np.array([x, y]) / self.step / self.spans_s.sum(axis=1).mean()
@@ -158,12 +165,7 @@ class AllLights:
             arriving_rows(flow, share, np.float32(sign / round_s), 0, out.shape[1], out)
             return out
 
-        beside = max(thread_count() - WRITING_THREADS, 1)  # the other threads write results meanwhile
-        return over_ranges(run, len(ways), each=1, threads=beside)
-
-
-def _spread(count: int, most: int) -> list[int]:
-    return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
+        return over_ranges(run, len(ways), each=1, threads=flow_threads())
 
 
 def _shifted(values: Floats, way: Floats) -> Floats:

@@ -1,8 +1,9 @@
-"""Whether lights show the same paint at one instant, once each one's plate is brought there along a velocity.
+"""What lights that follow each other show of motion: which velocity they propose, how well they agree along one.
 
 Plates of one light lie a round apart, and what repeats itself (a checker, a fence, folds) fits the next of its kind
-there. Plates of two lights lie a flash apart. Their shading differs, but paint and outlines are edges under both: the
-correlation of what is left of the logarithm of light without its shading says how well two lights agree.
+there. Plates of two lights lie a flash apart. Their shading differs, but paint and outlines are edges under both: flow
+leads from the logarithm of light without its shading to that of the next light, and the correlation of the two, once
+each is brought to one instant along a velocity, says how well they agree.
 """
 
 from collections.abc import Sequence
@@ -14,8 +15,8 @@ import numpy as np
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Floats
 from psvideo.plates.align.velocity.brightness import light_of
-from psvideo.plates.align.velocity.flow import TOE
-from psvideo.plates.align.velocity.moving_kernel import moved_rows
+from psvideo.plates.align.velocity.flow import TOE, evenly_spread, flow_from, flow_threads
+from psvideo.plates.align.velocity.moving_kernel import arriving_rows, moved_rows
 
 SMOOTH_PX, SHADING_PX, EVEN_PX = 1.0, 13, 21
 """Detail is the logarithm of smoothed light without its mean over the second, as a share of its size over the third."""
@@ -27,6 +28,15 @@ LEAST = np.float32(0.05) * CODES_EACH**2
 """Detail whose square is less than this shows nothing that could agree."""
 STRIDE = 2
 """Agreement is a mean over windows: every second velocity, in rows and columns, is enough."""
+MOST_STEPS = 4
+"""Flow is looked for between at most so many lights and those that follow them, evenly spread."""
+LEAST_STEP = 1e-3
+"""Lights that lie nearer together in time than this share of them all are of one flash."""
+COARSER = 1
+"""Flow from flash to flash is found on pictures halved once more than that from round to round: it takes a third of the
+time, and is as good where the way is short."""
+LONE_PX = 5
+"""The middle of what steps propose is the middle over such a window, too: single steps go astray in single places."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +64,30 @@ class BetweenLights:
         over_ranges(sharpen, len(codes), each=1)
         return cls(details=details, since_s=since_s[order], shape=shape)
 
+    def proposed(self) -> list[Floats]:
+        """Return the velocity, (2, row, col), in the middle of those by which one light's edges become those of the
+        next; none where all lights are of one flash."""
+        last_s = float(self.since_s[0] - self.since_s[-1])
+        steps = [
+            place
+            for place in range(len(self.details) - 1)
+            if self.since_s[place] - self.since_s[place + 1] > LEAST_STEP * last_s
+        ]
+        if not steps:
+            return []
+        chosen = [steps[place] for place in evenly_spread(len(steps), MOST_STEPS)]
+        ways = over_ranges(lambda n, _: self._stepped(chosen[n]), len(chosen), each=1, threads=flow_threads())
+        return [np.stack([cv2.medianBlur(plane, LONE_PX) for plane in _middle(ways)])]
+
+    def _stepped(self, place: int) -> Floats:
+        """Return the velocity, (2, row, col), by which a light's edges become those of the next one."""
+        since_s = float(self.since_s[place])
+        step_s = since_s - float(self.since_s[place + 1])
+        flow = flow_from(self.details[place], self.details[place + 1], coarser=COARSER)
+        out = np.empty((2, *self.shape), np.float32)
+        arriving_rows(flow, np.float32(since_s / step_s), np.float32(1 / step_s), 0, self.shape[0], out)
+        return out
+
     def disagree(self, velocity: Floats, window_px: int) -> Floats:
         """Return how little lights that follow each other agree along a velocity over windows of pixels of the
         sketches, (row, col): one minus their correlation, 0 to 2, in the mean."""
@@ -77,6 +111,19 @@ class BetweenLights:
         moved_rows(self.details[place], self.since_s[place], velocity, STRIDE, 0, len(out), out)
         out -= MIDDLE
         return out
+
+
+def _middle(few: Sequence[Floats]) -> Floats:
+    """Return the median of one to four arrays of a shape.
+
+    >>> [float(_middle([np.float32(one) for one in range(first, 5)])) for first in range(1, 5)]
+    [2.5, 3.0, 3.5, 4.0]
+    """
+    total = np.sum(few, axis=0)
+    if len(few) <= 2:
+        return np.asarray(total / np.float32(len(few)), np.float32)
+    total -= np.max(few, axis=0) + np.min(few, axis=0)
+    return np.asarray(total / np.float32(len(few) - 2), np.float32)
 
 
 def edges_of(codes: Codes8) -> Codes8:

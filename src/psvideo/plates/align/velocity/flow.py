@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import quantile
+from psvideo.compute.threads import WRITING_THREADS, thread_count
 from psvideo.model.arrays import Bytes, Codes8, Flags, Floats, Image
 from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
@@ -168,16 +169,17 @@ def _quarter(sizes: NDArray[Any]) -> float:
     return least + (float(quarter) + 0.5 - least) * (place + 0.5 - below) / alike
 
 
-def flow_from(one: Codes8, other: Codes8, start_px: tuple[float, float] | None = None) -> Floats:
+def flow_from(one: Codes8, other: Codes8, start_px: tuple[float, float] | None = None, *, coarser: int = 0) -> Floats:
     """Return the way from every pixel of one picture to the other, (row, col, 2) as (x right, y down), px.
 
-    ``start_px`` is where it is looked for; left out, nearby. It is 0 in pictures that are too small for flow.
+    ``start_px`` is where it is looked for; left out, nearby. Between pictures of FINE_PIXELS and more it is found on
+    those halved ``coarser`` times more often. It is 0 in pictures that are too small for flow.
     """
     if min(one.shape) < SHORTEST_PX or max(one.shape) < LONGEST_PX:
         return np.zeros((*one.shape, 2), np.float32)
     search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     if one.size >= FINE_PIXELS:
-        search.setFinestScale(FINEST_SCALE)
+        search.setFinestScale(FINEST_SCALE + coarser)
         search.setVariationalRefinementIterations(REFINED)
         search.setGradientDescentIterations(DESCENTS)
     else:
@@ -187,6 +189,20 @@ def flow_from(one: Codes8, other: Codes8, start_px: tuple[float, float] | None =
         start = np.empty((*one.shape, 2), np.float32)
         start[:] = start_px
     return np.asarray(search.calc(one, other, start), np.float32)
+
+
+def flow_threads() -> int:
+    """Return how many flows are found side by side: the other threads write results meanwhile."""
+    return max(thread_count() - WRITING_THREADS, 1)
+
+
+def evenly_spread(count: int, most: int) -> list[int]:
+    """Return places of at most so many of a count, evenly spread.
+
+    >>> evenly_spread(7, 4)
+    [0, 2, 4, 6]
+    """
+    return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
 
 
 def pixel_places(rows: int, cols: int) -> tuple[Floats, Floats]:

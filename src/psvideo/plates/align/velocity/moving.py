@@ -1,9 +1,10 @@
 """How everything moves at an instant, found from all lights together: one velocity for every pixel.
 
 What moves is the same under every light. Flow between the plates of single lights (before and after the instant)
-proposes velocities, and so does what the picture's change as a whole correlates with, where flow does not reach;
-standing still is always proposed. Taken is what makes the plates of all lights alike, in small windows, and rest where
-nothing explains much more than rest does: flow that fits shadows and shading of one light says nothing of the others.
+proposes velocities, and so do flow from one light's edges to those of the next, and what the picture's change as a
+whole correlates with, where flow does not reach; standing still is always proposed. Taken is what makes the plates of
+all lights alike, in small windows, and rest where nothing explains much more than rest does: flow that fits shadows and
+shading of one light says nothing of the others.
 """
 
 from collections.abc import Callable, Sequence
@@ -56,7 +57,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose
     between = BetweenLights.of(lights.codes, lights.spans_s, lights.shape)
     none = np.zeros((2, *lights.shape), np.float32)
     wide_rest, fine_rest = lights.unlike_over_windows(none)
-    proposals = lights.proposed()
+    proposals = lights.proposed() + between.proposed()
     chosen = _best(lights, between, proposals, wide_rest)
     velocity, best, fine = chosen.velocity, chosen.wide, lights.mean(chosen.unlike, FINE_PX)
     unchanged = np.asarray(lights.unchanged() + others, np.int16)
