@@ -35,14 +35,13 @@ class Metal(NamedTuple):
 
     shown: shares of n . l, of lobes h^2, h^4, h^8 up to h^256, and of the same times n . l; h is n . half way between
         light and camera. They sum up to 1.
-    rivals: the same of one kind of lobes alone; where their normals differ from those of all, nothing tells which is
-        right.
-    unlike: what ``shown`` leaves of a typical pixel's square roots of brightness, as a share of their squares.
+    rivals: the same of a flatter surface and of a steeper one, which explain it too, if worse.
+    likely: what ``shown`` leaves unexplained over what each of these does, 0 to 1.
     """
 
     shown: tuple[float, ...]
     rivals: tuple[tuple[float, ...], ...]
-    unlike: float
+    likely: tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

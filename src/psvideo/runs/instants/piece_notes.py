@@ -105,8 +105,8 @@ def noted_subject(folder: Path) -> Subject | None:
         raise PsvideoError(f"{path}: cannot be read ({fault}). {_ADVICE}") from fault
 
 
-def _metal(shown: list[float], rivals: list[list[float]], unlike: float) -> Metal:
-    return Metal(tuple(map(float, shown)), tuple(tuple(map(float, one)) for one in rivals), float(unlike))
+def _metal(shown: list[float], rivals: list[list[float]], likely: float) -> Metal:
+    return Metal(tuple(map(float, shown)), tuple(tuple(map(float, one)) for one in rivals), tuple(map(float, likely)))
 
 
 def noted(folder: Path) -> Iterator[tuple[range, Found]]:

@@ -21,9 +21,9 @@ from psvideo.solve.normals.task import Samples, Usable
 
 MOST_LEFT = 0.5
 """A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""
-MISFIT = 4.0
-"""A normal may be turned by so many times the angle that lobes leave of a typical pixel's light."""
-LEAST_DOUBT_DEG = 2.0
+FARTHER = 1.3
+"""The truth may be so many times as far as what is as likely as the best."""
+LEAST_DOUBT_DEG = 1.5
 """Where lobes of either kind agree and leave next to nothing, normals are still so far off."""
 USUAL, MOST_DEG, TINY_DEG = 0.8, 20.0, 1e-6
 """Where kinds of lobes happen to agree, normals are doubted by this much of what they differ by all over the subject,
@@ -125,8 +125,7 @@ def metal_doubt_deg(
     by_rivals, either = found
     is_metal = by_rivals > 0
     usual = np.sqrt(np.mean(np.minimum(by_rivals[is_metal], MOST_DEG) ** 2)) if is_metal.any() else 0.0
-    by_misfit = np.hypot(LEAST_DOUBT_DEG, MISFIT * np.degrees(np.sqrt(metal.unlike)))
-    own = np.where(is_metal, np.hypot(np.maximum(by_rivals, USUAL * usual), by_misfit), either)
+    own = np.where(is_metal, np.hypot(FARTHER * np.maximum(by_rivals, USUAL * usual), LEAST_DOUBT_DEG), either)
     return np.asarray(own, np.float32)
 
 
@@ -135,8 +134,8 @@ def _rivals_and_either_deg(points: SubjectPoints, starts: Doubles, metal: Metal)
     and the angle between the two where metal explains about as much as a matte surface."""
     own, left = _as_metal(points, starts, np.array(metal.shown))
     most = np.full(len(own), TINY_DEG)
-    for rival in metal.rivals:
-        most = np.maximum(most, _between_deg(own, _as_metal(points, starts, np.array(rival))[0]))
+    for rival, likely in zip(metal.rivals, metal.likely, strict=True):
+        most = np.maximum(most, likely * _between_deg(own, _as_metal(points, starts, np.array(rival))[0]))
     either = (left > MOST_LEFT) & (left < SURELY_MATTE)
     return np.where(left <= MOST_LEFT, most, 0.0), np.where(either, _between_deg(own, points.normals), 0.0)
 

@@ -29,9 +29,9 @@ from psvideo.solve.normals.robust.reflectance_fit import (
 
 LIGHTS_FOR_METAL = 8
 """Fewer explain every surface too well: photographs of pottery under six lights as well as metal's."""
-LEAST_UNLIKE = 2.5e-4
+LEAST_UNLIKE = 1e-4
 """What a matte surface with highlights leaves, as a share of the light's square roots, below which nobody asks."""
-MOST_LEFT = 0.35
+MOST_LEFT = 0.4
 """Of what that leaves, metal leaves at most this: of bronze, brushed and rough metal 0.02 to 0.35, of photographed
 pottery 0.5 to 1."""
 LEAST_TURNED_DEG = 2.0
@@ -40,15 +40,20 @@ PART_SURELY = 2.0
 """What fits a matte surface worst fits anything else better by chance: of it so many times more is asked."""
 POINTS, FEWEST, MEASUREMENTS = 200, 100, 8000
 """Lobes are fitted to so many points, to fewer under many lights."""
-TRIED, ALTERNATIONS, REWEIGHTED = 2, 7, 4
-"""Lobes and normals follow each other so often from every first guess, and from the best one; steps of weights."""
+TRIED, ALTERNATIONS, REWEIGHTED, SCALED = 3, 14, 8, 2
+"""Lobes and normals follow each other so often from every first guess, and from the best one; steps of weights, and of
+scales in each."""
+LEAST_SHOWN = 0.02
+"""Of a point's largest square root: so much is shown at least where roots are compared."""
 APART_DEG, FARTHEST_DEG = 7.0, 85.0
 """Between the normals that are tried, and how far they lean from the camera's axis."""
-WIDTH = 2.5
+WIDTH = 5.0
 FIRST_LOBES = (3, 4, 10)
 """Which lobes are tried first, beside those that fit the matte surface's normals: h^8, h^16, and h^4 times n . l."""
 NOT_METAL: tuple[Kind, ...] = ("shining", "rough", "soft")
 """What a subject is asked for beside metal."""
+SLOPES = (0.7, 1.4)
+"""How many times steeper surfaces are tried as well: of broad lobes slopes and profile stand in for each other."""
 HOPELESS = 2.0
 """What is so many times above MOST_LEFT then is not followed further."""
 
@@ -96,12 +101,25 @@ def _metal(points: SubjectPoints, matte: LobesAndNormals, *, surely: float = 1.0
     turned = np.degrees(np.arccos(np.clip((best.normals * matte.normals).sum(axis=1), -1, 1)))
     if median(best.unlike) > MOST_LEFT / surely * median(matte.unlike) or median(turned) < LEAST_TURNED_DEG * surely:
         return None
-    rivals = [_best(points, matte, columns) for columns in (PLAIN, SHADED)]
-    return Metal(
-        tuple(map(float, best.numbers)),
-        tuple(tuple(map(float, one.numbers)) for one in rivals if one is not None),
-        float(median(best.unlike)),
-    )
+    return Metal(tuple(map(float, best.numbers)), *_rivals(points, best))
+
+
+def _rivals(points: SubjectPoints, best: LobesAndNormals) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
+    """Return lobes that were fitted to a surface that is flatter, and steeper, than the best, each let go for one step;
+    and how likely they are: what the best leaves over what they do.
+
+    Of narrow highlights nothing else comes near; under broad ones a flatter surface with other lobes may look alike."""
+    from psvideo.solve.normals.metal.metal_kernel import fill_sums, find_normals
+
+    rivals, likely = list[tuple[float, ...]](), list[float]()
+    for slopes in SLOPES:
+        numbers, normals = _fitted(points, leaning(best.normals, slopes)).numbers, np.empty_like(best.normals)
+        find_normals(points.measured, points.seen, points.towards, points.half, directions(APART_DEG, FARTHEST_DEG), numbers, normals)
+        shown = np.empty_like(points.measured)
+        fill_sums(normals, points.towards, points.half, numbers, shown)
+        rivals.append(tuple(map(float, numbers)))
+        likely.append(min(float(median(best.unlike) / median(_unlike(points, shown))), 1.0))
+    return tuple(rivals), tuple(likely)
 
 
 def directions(apart_deg: float, farthest_deg: float) -> Doubles:
@@ -162,7 +180,22 @@ def _best(points: SubjectPoints, matte: LobesAndNormals, columns: Columns) -> Lo
     best = min(tried, key=lambda one: median(one.unlike))
     if median(best.unlike) > HOPELESS * MOST_LEFT * median(matte.unlike):
         return None
-    return _followed(points, best.numbers, starts, columns, times=ALTERNATIONS)
+    found = _followed(points, best.numbers, starts, columns, times=ALTERNATIONS)
+    for slopes in SLOPES:
+        first = _fitted(points, leaning(found.normals, slopes), columns).numbers
+        other = _followed(points, first, starts, columns, times=ALTERNATIONS)
+        found = min(found, other, key=lambda one: median(one.unlike))
+    return found
+
+
+def leaning(normals: Doubles, slopes: float) -> Doubles:
+    """Return unit normals (point, 3) of a surface whose slopes are so many times as steep.
+
+    >>> leaning(np.array([[0.6, 0.0, 0.8]]), 16 / 9).round(6).tolist()
+    [[0.8, 0.0, 0.6]]
+    """
+    steeper = normals * (slopes, slopes, 1.0)
+    return np.ascontiguousarray(steeper / np.linalg.norm(steeper, axis=1, keepdims=True))
 
 
 def _firsts(matte: LobesAndNormals) -> list[Doubles]:
@@ -202,18 +235,30 @@ def _fitted(
     if lit_from_around:
         parts = np.concatenate([parts, np.ones_like(parts[:1])])
         columns = (*columns, len(parts) - 1)
-    bright = np.maximum(points.measured, 0.0)
-    per = points.seen / (np.sqrt(bright) + 0.1 * np.sqrt(bright.max(axis=0)) + 1e-6)
+    bright = points.seen * np.maximum(points.measured, 0.0)
+    bright /= np.maximum(bright.sum(axis=0), 1e-12)
     numbers = np.full(len(parts), 1 / len(parts))
     for _ in range(REWEIGHTED):
-        shown = per * np.tensordot(numbers, parts, axes=1)
-        scale = (shown * per * bright).sum(axis=0) / np.maximum((shown**2).sum(axis=0), 1e-12)
-        rest = per * bright - scale * shown
-        spread = WIDTH * 1.48 * median(np.abs(rest[points.seen > 0])) + 1e-9
-        root = per / np.sqrt(1 + (rest / spread) ** 2)
-        wanted = (root * scale * parts[list(columns)]).reshape(len(columns), -1).T
+        scale, per = _per_root(points.seen, np.sqrt(bright), np.sqrt(np.tensordot(numbers, parts, axes=1)))
+        wanted = (per * scale * parts[list(columns)]).reshape(len(columns), -1).T
         numbers = np.zeros(len(parts))
-        numbers[list(columns)] = nnls(wanted, (root * bright).ravel())[0]
+        numbers[list(columns)] = nnls(wanted, (per * bright).ravel())[0]
         numbers /= max(float(numbers.sum()), 1e-9)
     unlike = _unlike(points, np.tensordot(numbers, parts, axes=1))
     return LobesAndNormals(numbers[: 1 + 2 * LOBES], np.ascontiguousarray(normals), unlike)
+
+
+def _per_root(seen: Doubles, root: Doubles, shown: Doubles) -> tuple[Doubles, Doubles]:
+    """Return every point's scale of what is ``shown``, and by what differences of light are multiplied to become those
+    of square roots, of which normals leave the least; where these stand out they count less. ``root`` and ``shown`` are
+    square roots (light, point).
+
+    Lobes that were fitted to light itself, and normals to its roots, drove each other away from where both were right.
+    """
+    weights = seen
+    for _ in range(SCALED):
+        scale = (weights * root * shown).sum(axis=0) / np.maximum((weights * shown**2).sum(axis=0), 1e-12)
+        rest = root - scale * shown
+        spread = WIDTH * 1.48 * median(np.abs(rest[seen > 0])) + 1e-9
+        weights = seen / (1 + (rest / spread) ** 2)
+    return scale**2, np.sqrt(weights) / (root + np.maximum(scale * shown, LEAST_SHOWN * root.max(axis=0)) + 1e-9)
