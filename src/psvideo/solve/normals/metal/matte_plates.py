@@ -21,7 +21,7 @@ from psvideo.solve.normals.task import Samples, Usable
 
 MOST_LEFT = 0.5
 """A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""
-FARTHER = 1.3
+FARTHER = 1.0
 """The truth may be so many times as far as what is as likely as the best."""
 LEAST_DOUBT_DEG = 1.5
 """Where lobes of either kind agree and leave next to nothing, normals are still so far off."""

@@ -52,6 +52,8 @@ FIRST_LOBES = (3, 4, 10)
 """Which lobes are tried first, beside those that fit the matte surface's normals: h^8, h^16, and h^4 times n . l."""
 NOT_METAL: tuple[Kind, ...] = ("shining", "rough", "soft")
 """What a subject is asked for beside metal."""
+LEAST_FACING = 0.05
+"""The cosine to the camera of what is seen."""
 SLOPES = (0.7, 1.4)
 """How many times steeper surfaces are tried as well: of broad lobes slopes and profile stand in for each other."""
 HOPELESS = 2.0
@@ -153,15 +155,22 @@ def _matte(points: SubjectPoints) -> LobesAndNormals:
     sizes = sizes_of(points)
     typical = median(sizes[sizes > 0])
     g = points.normals * np.maximum(sizes, 1e-3 * typical)[:, None]
-    kinds = [_fitted(points, points.normals, lit_from_around=True)]
+    kinds = [_fitted(points, _seen(points.normals), lit_from_around=True)]
     for kind in NOT_METAL:
         found = alternated(points, g, typical, Sought(kind))
-        turned = np.ascontiguousarray(found.g / np.linalg.norm(found.g, axis=1, keepdims=True))
+        turned = _seen(found.g)
         lobes = _fitted(points, turned, lit_from_around=True)
         cosines = (points.towards * turned).sum(axis=-1)
         shown = cosines + np.tensordot(found.model, parts_of(points, found.g, typical)[1:], axes=1)
         kinds += [lobes, LobesAndNormals(lobes.numbers, turned, _unlike(points, shown))]
     return min(kinds, key=lambda one: median(one.unlike))
+
+
+def _seen(normals: Doubles) -> Doubles:
+    """Return unit normals (point, 3) of vectors, none of which faces away from the camera: what is seen does not."""
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    turned = np.where(normals[:, 2:] > LEAST_FACING * length, normals, (1, 1, 0) * normals + (0, 0, LEAST_FACING) * length)
+    return np.ascontiguousarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
 
 def _unlike(points: SubjectPoints, shown: Doubles) -> Doubles:
