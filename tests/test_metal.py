@@ -1,7 +1,7 @@
 """Bare metal is told from what is matte, soft or varnished, and its normals are found under its own highlights.
 
-The pictures are made here, of microfacets (B. Walter et al., EGSR 2007, and G. Ward's lobe of 1992), which the lobes
-that are fitted are not.
+The pictures are made here, of microfacets (B. Walter et al., EGSR 2007, G. Ward's lobe of 1992, R. Cook and
+K. Torrance's of 1982), which the lobes that are fitted are not.
 """
 
 from typing import Literal
@@ -14,16 +14,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from ring_and_ball import ring
 
-from psvideo.model.surface import Metal, Subject, Surface
+from psvideo.model.surface import Metal, RivalLobes, Subject, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
+from psvideo.solve.normals.metal.lobe_fit import directions
 from psvideo.solve.normals.metal.matte_plates import matte_plates, metal_doubt_deg
-from psvideo.solve.normals.metal.metal_fit import directions, metal_of
+from psvideo.solve.normals.metal.metal_fit import metal_of
 from psvideo.solve.normals.metal.metal_kernel import fill_matte, fill_sums, fill_unlike, find_normals
 from psvideo.solve.normals.solving import Solving
 
 Array = NDArray[np.float64]
-Kind = Literal["microfacets", "ward"]
+Kind = Literal["microfacets", "ward", "beckmann"]
 SIZE = 72
 EIGHT = np.concatenate([ring(5, 45), ring(3, 22)])
 TWELVE = np.concatenate([ring(8, 48), ring(4, 22)])
@@ -48,6 +49,11 @@ def lobe(normals: Array, light: Array, roughness: float, kind: Kind) -> Array:
     if kind == "ward":
         tangent_square = (1 - h * h) / (h * h)
         return np.asarray(np.exp(-tangent_square / square) / (4 * np.pi * square * np.sqrt(c * facing)))
+    if kind == "beckmann":
+        along = float((light + UP)[2] / np.linalg.norm(light + UP))
+        open_to_both = np.minimum(1, 2 * h * np.minimum(facing, c) / along)
+        facets = np.exp(-(1 - h * h) / (h * h) / square) / (np.pi * square * h**4)
+        return np.asarray(facets * open_to_both / (4 * c * facing))
     share = square / np.pi / (h * h * (square - 1) + 1) ** 2
     seen = [2 * each / (each + np.sqrt(square + (1 - square) * each * each)) for each in (c, facing)]
     return np.asarray(share * seen[0] * seen[1] / (4 * c * facing))
@@ -90,6 +96,7 @@ METALS: list[tuple[tuple[float, float, float], Kind, Array, float]] = [
     (BRONZE, "microfacets", EIGHT, 3.5),
     (BRONZE, "microfacets", TWELVE, 3.5),
     (BRONZE, "ward", TWELVE, 3.5),
+    (BRONZE, "beckmann", TWELVE, 3.5),
     (STEEL, "ward", TWELVE, 3.5),
 ]
 
@@ -251,7 +258,18 @@ def test_clipped_and_dark_samples_stay_as_they_are() -> None:
     assert np.isfinite(made).all()
 
 
-def test_where_kinds_of_lobes_disagree_normals_are_doubted() -> None:
+def test_under_broad_lobes_a_flatter_or_steeper_surface_is_likelier() -> None:
+    likely = {
+        roughness: max(rival.likely for rival in found.rivals)
+        for roughness in (0.25, 0.35, 0.6)
+        if (found := found_in(shot(bumps(), TWELVE, (0.02, 0.7, roughness), "ward"), TWELVE)) is not None
+    }
+    assert likely[0.25] < 0.4
+    assert likely[0.35] < 0.4
+    assert 0.6 < likely[0.6] <= 1.0
+
+
+def test_where_likely_lobes_disagree_normals_are_doubted() -> None:
     plates = shot(bumps(), TWELVE, BRONZE).astype(np.float32)
     lit, how = under(TWELVE), Solving()
     surface, one, _ = how.measured(LitPlates([*plates], lit))
@@ -259,7 +277,7 @@ def test_where_kinds_of_lobes_disagree_normals_are_doubted() -> None:
     assert look is not None
     metal = metal_of([look])
     assert metal is not None
-    matte_rival = (1.0, *(0.0,) * 16)
+    matte_rival = RivalLobes((1.0, *(0.0,) * 16), 1.0)
     doubts = [
         metal_doubt_deg([*plates], lit, each, surface, one.usable, seen=None, step=4)
         for each in (metal._replace(rivals=()), metal._replace(rivals=(matte_rival,)))

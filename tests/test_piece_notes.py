@@ -10,7 +10,7 @@ from clips_in_pieces import filmed, same_in_pieces
 import psvideo as ps
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_folders import begun_folder, whole_folder
-from psvideo.model.surface import Metal, Reflectance, Subject
+from psvideo.model.surface import Metal, Reflectance, RivalLobes, Subject
 from psvideo.report.observe.against_noise import AgainstNoise
 from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
@@ -86,7 +86,7 @@ def test_every_number_that_was_noted_of_a_round_comes_back_and_follows_those_bef
     }
 
 
-METAL = Metal((0.25, *(0.0,) * 14, 1 / 3, 0.1), ((0.5,) * 17, (0.1 + 0.2,) * 17), 1e-4 / 3)
+METAL = Metal((0.25, *(0.0,) * 14, 1 / 3, 0.1), (RivalLobes((0.5,) * 17, 1e-4 / 3), RivalLobes((0.1 + 0.2,) * 17, 1.0)))
 
 
 @pytest.mark.parametrize(

@@ -30,18 +30,24 @@ class Reflectance(NamedTuple):
     narrow: float
 
 
+class RivalLobes(NamedTuple):
+    """Lobes, as those of ``Metal``, of a surface that is flatter or steeper, and how likely they are: what the best
+    leave unexplained over what these do, 0 to 1."""
+
+    shown: tuple[float, ...]
+    likely: float
+
+
 class Metal(NamedTuple):
     """What bare metal, and paint full of metal flakes, shows under a light, every pixel in a scale of its own.
 
     shown: shares of n . l, of lobes h^2, h^4, h^8 up to h^256, and of the same times n . l; h is n . half way between
         light and camera. They sum up to 1.
-    rivals: the same of a flatter surface and of a steeper one, which explain it too, if worse.
-    likely: what ``shown`` leaves unexplained over what each of these does, 0 to 1.
+    rivals: what would explain it too, if worse.
     """
 
     shown: tuple[float, ...]
-    rivals: tuple[tuple[float, ...], ...]
-    likely: tuple[float, ...]
+    rivals: tuple[RivalLobes, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
-from psvideo.model.surface import Metal, Reflectance, Subject
+from psvideo.model.surface import Metal, Reflectance, RivalLobes, Subject
 from psvideo.model.timing import Timing
 from psvideo.report.observe.close_looks import CloseLooks
 from psvideo.report.observe.facts import InstantFacts
@@ -105,8 +105,9 @@ def noted_subject(folder: Path) -> Subject | None:
         raise PsvideoError(f"{path}: cannot be read ({fault}). {_ADVICE}") from fault
 
 
-def _metal(shown: list[float], rivals: list[list[float]], likely: float) -> Metal:
-    return Metal(tuple(map(float, shown)), tuple(tuple(map(float, one)) for one in rivals), tuple(map(float, likely)))
+def _metal(shown: list[float], rivals: list[tuple[list[float], float]]) -> Metal:
+    every = (RivalLobes(tuple(map(float, lobes)), float(likely)) for lobes, likely in rivals)
+    return Metal(tuple(map(float, shown)), tuple(every))
 
 
 def noted(folder: Path) -> Iterator[tuple[range, Found]]:

@@ -13,7 +13,7 @@ from psvideo.model.arrays import Doubles, Floats, Mask
 from psvideo.model.surface import Metal, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.metal.metal_fit import FARTHEST_DEG, directions
+from psvideo.solve.normals.metal.lobe_fit import FARTHEST_DEG, directions
 from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance import points_at
 from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
@@ -21,12 +21,10 @@ from psvideo.solve.normals.task import Samples, Usable
 
 MOST_LEFT = 0.5
 """A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""
-FARTHER = 1.0
-"""The truth may be so many times as far as what is as likely as the best."""
-LEAST_DOUBT_DEG = 1.5
-"""Where lobes of either kind agree and leave next to nothing, normals are still so far off."""
+LEAST_DOUBT_DEG = 2.0
+"""Where likely lobes agree, normals are still so far off."""
 USUAL, MOST_DEG, TINY_DEG = 0.8, 20.0, 1e-6
-"""Where kinds of lobes happen to agree, normals are doubted by this much of what they differ by all over the subject,
+"""Where likely lobes happen to agree, normals are doubted by this much of what they differ by all over the subject,
 root mean square: what lobes are not known to be is wrong everywhere. No pixel counts for more than MOST_DEG there."""
 APART_DEG = 10.0
 """Between the normals from which each pixel's is looked for."""
@@ -125,17 +123,17 @@ def metal_doubt_deg(
     by_rivals, either = found
     is_metal = by_rivals > 0
     usual = np.sqrt(np.mean(np.minimum(by_rivals[is_metal], MOST_DEG) ** 2)) if is_metal.any() else 0.0
-    own = np.where(is_metal, np.hypot(FARTHER * np.maximum(by_rivals, USUAL * usual), LEAST_DOUBT_DEG), either)
+    own = np.where(is_metal, np.hypot(np.maximum(by_rivals, USUAL * usual), LEAST_DOUBT_DEG), either)
     return np.asarray(own, np.float32)
 
 
 def _rivals_and_either_deg(points: SubjectPoints, starts: Doubles, metal: Metal) -> tuple[Doubles, Doubles]:
-    """Return of points how far normals under one kind of lobes are from those under all, above 0, where they are metal;
-    and the angle between the two where metal explains about as much as a matte surface."""
+    """Return of points how far normals under rival lobes are from those under the best, times how likely these are, and
+    above 0, where they are metal; and the angle to the matte normal where metal explains about as much."""
     own, left = _as_metal(points, starts, np.array(metal.shown))
     most = np.full(len(own), TINY_DEG)
-    for rival, likely in zip(metal.rivals, metal.likely, strict=True):
-        most = np.maximum(most, likely * _between_deg(own, _as_metal(points, starts, np.array(rival))[0]))
+    for rival in metal.rivals:
+        most = np.maximum(most, rival.likely * _between_deg(own, _as_metal(points, starts, np.array(rival.shown))[0]))
     either = (left > MOST_LEFT) & (left < SURELY_MATTE)
     return np.where(left <= MOST_LEFT, most, 0.0), np.where(either, _between_deg(own, points.normals), 0.0)
 
