@@ -17,8 +17,8 @@ from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 
 REWEIGHTED, SCALED = 8, 2
 """Steps of weights, and of scales in each."""
-WIDTH = 5.0
-"""Cauchy's, in standard deviations of what is left: with half of it the steep points, which tell lobes apart, hardly
+WIDTH = 3.5
+"""Cauchy's, in standard deviations of what is left: with less the steep points, which tell lobes apart, hardly
 counted."""
 LEAST_SHOWN = 0.02
 """Of a point's largest square root: so much is shown at least where roots are compared."""

@@ -21,6 +21,8 @@ from psvideo.solve.normals.task import Samples, Usable
 
 MOST_LEFT = 0.5
 """A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""
+FARTHER = 1.3
+"""The truth may be so many times as far as what is as likely as the best."""
 LEAST_DOUBT_DEG = 2.0
 """Where likely lobes agree, normals are still so far off."""
 USUAL, MOST_DEG, TINY_DEG = 0.8, 20.0, 1e-6
@@ -123,7 +125,7 @@ def metal_doubt_deg(
     by_rivals, either = found
     is_metal = by_rivals > 0
     usual = np.sqrt(np.mean(np.minimum(by_rivals[is_metal], MOST_DEG) ** 2)) if is_metal.any() else 0.0
-    own = np.where(is_metal, np.hypot(np.maximum(by_rivals, USUAL * usual), LEAST_DOUBT_DEG), either)
+    own = np.where(is_metal, np.hypot(FARTHER * np.maximum(by_rivals, USUAL * usual), LEAST_DOUBT_DEG), either)
     return np.asarray(own, np.float32)
 
 
