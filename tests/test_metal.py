@@ -166,7 +166,7 @@ def test_lights_on_a_ring_are_not_asked() -> None:
 
 
 def test_fewer_lights_are_not_asked() -> None:
-    lights = EIGHT[:7]
+    lights = EIGHT[:6]
     plates = shot(bumps(), lights, BRONZE)
     assert found_in(plates, lights) is None
     assert solved(plates, lights).normals.tobytes() == solved(plates, lights, metal=False).normals.tobytes()

@@ -30,8 +30,8 @@ from psvideo.solve.normals.robust.reflectance_fit import (
     sizes_of,
 )
 
-LIGHTS_FOR_METAL = 8
-"""Fewer explain every surface too well: photographs of pottery under six lights as well as metal's."""
+LIGHTS_FOR_METAL = 7
+"""Under six some pixels find where lamps are mirrored on the wrong side: of what is trusted 5 % is over 10 degrees."""
 LEAST_UNLIKE = 1e-4
 """What a matte surface with highlights leaves, as a share of the light's square roots, below which nobody asks."""
 MOST_LEFT = 0.4
