@@ -150,13 +150,13 @@ def _parts(looked: LookedAt) -> list[tuple[int, ...]]:
 
 
 def _glances(take: Take) -> tuple[ShortLook, ...]:
-    """ShortLook at places over the rest of the take, the last frames among them."""
+    """Glance at places over the rest of the take, the last frames among them."""
     numbers = take.clip.numbers
     return _over(take, numbers[len(take.numbers) :])
 
 
 def _over(take: Take, numbers: Sequence[int]) -> tuple[ShortLook, ...]:
-    """ShortLook at places spread evenly over some frames; none where these are too few."""
+    """Glance at places spread evenly over some frames; at none where these are too few."""
     if len(numbers) < EACH:
         return ()
     firsts = np.unique(np.linspace(0, len(numbers) - EACH, PLACES).round().astype(int)).tolist()

@@ -66,8 +66,7 @@ FLASHES_DIFFER = 0.7
 class Verdict:
     """A fit, the plan under which it was made (another camera than the given plan's where that was wrong by far), and
     whether it is to be believed. ``seed`` is where the given plan's strobe was looked for first. ``other``: flashes at
-    other times that explain the clip as well. ``placed``: it was found by what holds
-    whatever moves."""
+    other times that explain the clip as well. ``placed``: it was found by what holds whatever moves."""
 
     plan: Plan
     found: ClipFit

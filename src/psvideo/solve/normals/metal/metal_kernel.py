@@ -30,7 +30,7 @@ LEFT_OUT_OF = 6
 CLEARLY_LESS = 0.5
 """A normal that is far from the best start is taken where it leaves less than this: lobes are never quite right, and by
 chance the wrong side of where lamps are mirrored often leaves a little less."""
-LEANING, LEAST_FACING = 0.25, 0.1
+LEANING, LEAST_COSINE = 0.25, 0.1
 """What leans shows the camera more facets, and is brighter by a power of the cosine to it: 0 of some formulas, 1/2 of
 Ward's; so is its albedo, by half of that."""
 TINY = 1e-12
@@ -272,7 +272,7 @@ def fill_matte(
             faced += max(towards[light, p, 2], 0.0)
             many += counts[light, p] if c > 0.0 else 0.0
         scale = (along / square) ** 2
-        size = scale * straight / faced * max(z, LEAST_FACING) ** LEANING
+        size = scale * straight / faced * max(z, LEAST_COSINE) ** LEANING
         m[:], own[:] = 0.0, 0.0
         m[0] = m[3] = m[5] = 1e-9
         for light in range(lights):
