@@ -6,13 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from angles import angles_deg
 from filmed_rounds import (
     PITCH_S,
     ROWS,
     WALL_M,
     Filmed,
     Plates,
-    angle_deg,
     at_once,
     brought,
     brought_as_filmed,
@@ -115,10 +115,11 @@ def test_what_the_subject_hides_of_the_wall_is_right_or_not_valid() -> None:
     hits = clip.stage.view(one.time_s).hits
     wall = hits.image((hits.point_m[:, 2] <= WALL_M + 0.01).astype(np.float32)) > 0.5
 
-    shadows = angle_deg(clip.solved(at_once(clip, one.time_s)).normals, true_normals(hits)) > 2
+    still = clip.solved(at_once(clip, one.time_s))
+    shadows = still.valid & (angles_deg(still.normals, true_normals(hits)) > 2)
 
     def wrong(surface: Surface) -> float:
-        off = angle_deg(surface.normals, true_normals(hits)) > 10
+        off = angles_deg(surface.normals, true_normals(hits)) > 10
         return float((off & surface.valid & wall & ~shadows).sum() / wall.sum())
 
     def judged(shown: Round) -> Surface:
@@ -138,7 +139,7 @@ def test_where_no_motion_explains_what_changed_normals_are_as_good_as_without_al
     def off_deg(shown: Round) -> float:
         images = [plate.image for plate in shown.plates]
         surface = Solving().solve(images, clip.lit, seen=seen(shown), unsure=shown.unsure)
-        off = angle_deg(surface.normals, true_normals(clip.stage.view(shown.time_s).hits))
+        off = angles_deg(surface.normals, true_normals(clip.stage.view(shown.time_s).hits))
         return float(np.where(surface.shown, off, 90)[clip.subject(shown.time_s)].mean())
 
     assert off_deg(brought(clip)[1]) < off_deg(brought(clip, Aligning(align="none"))[1])

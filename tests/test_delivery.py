@@ -1,6 +1,5 @@
 """What lies beside the maps of a delivery: plates, their sum, movies, the timeline, presets and their notes."""
 
-import hashlib
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -11,6 +10,7 @@ import av
 import numpy as np
 import OpenEXR
 import pytest
+from bytes_of_files import digest_of_results
 
 from psvideo.cli.app import main
 from psvideo.cli.options.per_light import parse_weights
@@ -74,12 +74,6 @@ def picture(path: Path) -> np.ndarray:
 def at_or_before(folder: Path, number: int) -> Path:
     """Return a light's plate of a round, or the one before: a dark slot may be cut off at the clip's end."""
     return max(path for path in folder.iterdir() if int(path.name.split(".")[1]) <= number)
-
-
-def digest(folder: Path) -> dict[str, str]:
-    """Return the digest of every file but the report, which names its own command."""
-    files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.stem != "report")
-    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
 def decoded(path: Path) -> tuple[av.video.stream.VideoStream, list[np.ndarray]]:
@@ -269,7 +263,7 @@ def test_a_stopped_run_goes_on_to_the_same_delivery(clip: Path, whole: Path, mon
     min((partial / "beauty").iterdir()).unlink()
     min((partial / "preview" / ".relit").iterdir()).unlink()
     assert normals(clip, out, *EVERYTHING, "--resume") == 0
-    assert digest(out) == digest(whole)
+    assert digest_of_results(out) == digest_of_results(whole)
 
 
 def test_a_preset_sets_what_its_program_wants_and_says_how_to_load_it(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from filmed_rounds import angle_deg
+from angles import angles_deg
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import thin
@@ -64,7 +64,7 @@ def test_noise_at_rest_falls_with_the_root_of_the_results_averaged(results: int)
     true = surface(rng, sigma=0)
     noisy = [surface(rng) for _ in range(results)]
     shown = run(noisy, results)[-1]
-    before, after = (np.sqrt(np.mean(angle_deg(one.normals, true.normals) ** 2)) for one in (noisy[-1], shown))
+    before, after = (np.sqrt(np.mean(angles_deg(one.normals, true.normals) ** 2)) for one in (noisy[-1], shown))
     assert after < 1.15 * before / np.sqrt(results)
     assert np.mean(shown.albedo / true.albedo) == pytest.approx(1, abs=1e-3)
 
@@ -78,7 +78,7 @@ def test_what_moves_leaves_no_ghost(step_px: float) -> None:
     true = surface(rng, sigma=0, bump_at=places[-1])
     y, x = np.mgrid[0:ROWS, 0:COLS]
     reached = (np.abs(y - 48) < 21) & (x > 9) & (x < places[-1] + 21)
-    error = [angle_deg(one.normals, true.normals)[reached] for one in (noisy[-1], shown)]
+    error = [angles_deg(one.normals, true.normals)[reached] for one in (noisy[-1], shown)]
     assert error[1].mean() < error[0].mean() + 0.02
     assert np.percentile(error[1], 99) < 1.1 * np.percentile(error[0], 99)
 
@@ -118,8 +118,8 @@ def test_noise_that_a_filter_spread_falls_as_well_where_that_is_known() -> None:
     error = {}
     for spread in (1.0, SPREAD):
         shown = run(noisy, 9, evenly_lit(spread))[-1]
-        error[spread] = np.sqrt(np.mean(angle_deg(shown.normals, true.normals) ** 2))
-    before = np.sqrt(np.mean(angle_deg(noisy[-1].normals, true.normals) ** 2))
+        error[spread] = np.sqrt(np.mean(angles_deg(shown.normals, true.normals) ** 2))
+    before = np.sqrt(np.mean(angles_deg(noisy[-1].normals, true.normals) ** 2))
     assert error[SPREAD] < 1.25 * before / np.sqrt(9)
     assert error[1.0] > 0.9 * before
 
@@ -133,7 +133,7 @@ def test_what_moves_leaves_no_ghost_in_noise_that_a_filter_spread(step_px: float
     true = surface(rng, sigma=0, bump_at=places[-1])
     y, x = np.mgrid[0:ROWS, 0:COLS]
     reached = (np.abs(y - 48) < 21) & (x > 9) & (x < places[-1] + 21)
-    error = [angle_deg(one.normals, true.normals)[reached] for one in (noisy[-1], shown)]
+    error = [angles_deg(one.normals, true.normals)[reached] for one in (noisy[-1], shown)]
     assert error[1].mean() < error[0].mean() + 0.02
     assert np.percentile(error[1], 99) < 1.1 * np.percentile(error[0], 99)
 
@@ -156,7 +156,7 @@ def test_a_picture_that_moves_as_a_whole_is_no_worse_for_averaging(step_px: int,
         valid = np.ones((ROWS, COLS), np.bool_)
         noisy.append(Surface(normals=normals, albedo=np.asarray(length, np.float32), valid=valid))
     shown = run(noisy, 8, evenly_lit())[-1]
-    error = [angle_deg(one.normals, true).mean() for one in (noisy[-1], shown)]
+    error = [angles_deg(one.normals, true).mean() for one in (noisy[-1], shown)]
     assert error[1] < 1.05 * error[0]
 
 

@@ -2,7 +2,6 @@
 
 import collections
 import contextlib
-import hashlib
 import shutil
 import weakref
 from collections.abc import Callable, Iterator
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 import tifffile
+from bytes_of_files import digest
 
 from psvideo.cli.app import main
 from psvideo.clip import kept, reading
@@ -56,8 +56,7 @@ def decoded(monkeypatch: pytest.MonkeyPatch) -> collections.Counter[str]:
 
 
 def pictures(folder: Path) -> dict[str, str]:
-    files = sorted(folder.rglob("*.exr"))
-    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    return {name: one for name, one in digest(folder).items() if name.endswith(".exr")}
 
 
 @pytest.mark.parametrize("known", [False, True], ids=["timing found", "timing given"])

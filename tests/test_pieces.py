@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clips_in_pieces import digest, filmed, judged, same_in_pieces
+from bytes_of_files import digest_of_results
+from clips_in_pieces import filmed, judged, same_in_pieces
 
 import psvideo as ps
 from psvideo.clip import read_frames
@@ -107,7 +108,7 @@ def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_
     noted_by_first = next(tmp_path.glob(".*/.pieces/subject.json"))
     assert json.loads(noted_by_first.read_text())["reflectance"] == list(found.pop() or ())
     ps.normals(clip, out=tmp_path / "pieces", resume=True, **given)
-    assert digest(tmp_path / "pieces") == digest(tmp_path / "whole")
+    assert digest_of_results(tmp_path / "pieces") == digest_of_results(tmp_path / "whole")
     assert judged(tmp_path / "pieces") == judged(tmp_path / "whole")
 
 

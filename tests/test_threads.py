@@ -1,6 +1,5 @@
 """The same command gives the same bytes, whatever the number of threads, the load, and whether it was stopped."""
 
-import hashlib
 import os
 import signal
 import subprocess
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bytes_of_files import Digest, digest_of_results
 from lit_ball import LIT_BALL
 
 from psvideo.cli.app import main
@@ -50,9 +50,6 @@ while True:
         pass
     sleep(0.004)
 """
-Digest = dict[str, str]
-PER_RUN = ("report.json", "report.html")
-"""They hold the command, and with it the output's name and --resume."""
 
 
 def test_ranges_follow_the_work_and_results_their_order() -> None:
@@ -146,13 +143,6 @@ def ended(process: "subprocess.Popen[str]") -> None:
     assert process.returncode == 0, said
 
 
-def digest(out: Path) -> Digest:
-    """Return a checksum of every file of a run but what depends on its name."""
-    files = [path for path in sorted(out.rglob("*")) if path.is_file() and path.name not in PER_RUN]
-    assert files or out.is_file()
-    return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files or [out]}
-
-
 @contextmanager
 def load() -> Iterator[None]:
     """Keep the machine busy with two loops that come and go, which is worse to threads than loops that stay."""
@@ -185,7 +175,7 @@ def by_one_thread(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Calla
         command, *options = (word.format(clip=clip) for word in COMMANDS[name])
         out = tmp_path_factory.mktemp("by_one_thread") / "out"
         ended(begun(command, clip, *options, "-o", out, threads=1))
-        return digest(out)
+        return digest_of_results(out)
 
     return digest_of
 
@@ -202,7 +192,7 @@ def test_any_number_of_threads_gives_the_same_bytes_also_under_load(
         out = tmp_path / f"by_{count}_threads"
         with around:
             ended(begun(command, clip, *options, "-o", out, threads=count))
-        assert digest(out) == by_one_thread(name), f"{count} threads"
+        assert digest_of_results(out) == by_one_thread(name), f"{count} threads"
 
 
 @pytest.mark.parametrize("name", [pytest.param("split", marks=pytest.mark.campaign), "normals"])
@@ -221,7 +211,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(
     assert not out.exists(), "killed in the middle"
     (partial / ".left.exr.1.partial").write_bytes(b"half a file")
     ended(begun(command, clip, *options, "-o", out, "--resume", threads=8))
-    assert digest(out) == by_one_thread(name)
+    assert digest_of_results(out) == by_one_thread(name)
 
 
 LEFT_IN_C = """

@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 import psutil
 import pytest
-from clips_in_pieces import HEIGHT, WIDTH, digest, filmed, judged
+from bytes_of_files import digest_of_results
+from clips_in_pieces import HEIGHT, WIDTH, filmed, judged
 
 import psvideo as ps
 from psvideo.cli.app import main
@@ -34,7 +35,7 @@ def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path
     assert [one.clip.name for one in results] == ["dark", "clip"], "the worst first"
     assert "dark" in results[0].fault
     assert results[1].instants == len(judged(tmp_path / "one" / "clip")["instants"])
-    assert digest(tmp_path / "all" / "clip") == digest(tmp_path / "one" / "clip")
+    assert digest_of_results(tmp_path / "all" / "clip") == digest_of_results(tmp_path / "one" / "clip")
     assert judged(tmp_path / "all" / "clip") == judged(tmp_path / "one" / "clip")
     assert "dark: failed." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
     again = ps.normals_of_takes([clip], out=tmp_path / "all" / "clip", workers=2, pieces=2, resume=True, **given)
@@ -60,7 +61,7 @@ def test_split_of_several_takes_gives_the_bytes_of_one_at_a_time(
         assert named == ["dark", "again", "clip"], said.out
         assert ("all done" in said.out) == (not how and bool(again)), "workers say nothing"
     for name in ("clip", "again"):
-        assert digest(tmp_path / "all" / name) == digest(tmp_path / "one" / name)
+        assert digest_of_results(tmp_path / "all" / name) == digest_of_results(tmp_path / "one" / name)
     assert "dark: failed." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
     with pytest.raises(UsageError, match="exists already"):
         ps.split_of_takes(takes, out=tmp_path / "all", workers=2)
@@ -77,7 +78,7 @@ def test_a_worker_that_is_killed_is_replaced_and_its_piece_done_again(tmp_path: 
     assert len(busy) >= 2
     busy[0].kill()
     assert running.wait(timeout=300) == 0
-    assert digest(tmp_path / "two" / "clip") == digest(tmp_path / "one" / "clip")
+    assert digest_of_results(tmp_path / "two" / "clip") == digest_of_results(tmp_path / "one" / "clip")
     assert judged(tmp_path / "two" / "clip") == judged(tmp_path / "one" / "clip")
 
 
@@ -113,7 +114,7 @@ def test_a_worker_that_hangs_is_replaced_and_its_piece_done_again(
     stopping.join()
     assert stopped
     assert not stopped[0].is_running()
-    assert digest(tmp_path / "two" / "clip") == digest(tmp_path / "one" / "clip")
+    assert digest_of_results(tmp_path / "two" / "clip") == digest_of_results(tmp_path / "one" / "clip")
 
 
 @pytest.mark.campaign
@@ -143,7 +144,7 @@ def test_a_scheduler_that_is_killed_leaves_a_run_that_resume_ends(tmp_path: Path
     assert "The cluster's scheduler is gone." in said
     assert "Traceback" not in said
     subprocess.run([*normals, str(out), "--resume"], check=True)
-    assert digest(out) == digest(tmp_path / "one" / "clip")
+    assert digest_of_results(out) == digest_of_results(tmp_path / "one" / "clip")
     assert not [*out.parent.glob(".*")]
 
 

@@ -1,6 +1,5 @@
 """Small filmed clips, and the bytes that runs of them leave."""
 
-import hashlib
 import itertools
 import json
 from pathlib import Path
@@ -8,16 +7,13 @@ from typing import Any
 
 import cv2
 import numpy as np
+from bytes_of_files import digest_of_results
 from numpy.typing import NDArray
 
 import psvideo as ps
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.rows.shutter import Pulse, row_weights
-
-PER_RUN = ("report.json", "report.html")
-"""They hold where and when a run was made."""
-
 
 RIG = """
 schema = "psvideo-rig/1"
@@ -110,11 +106,6 @@ def _ball(rig: Rig, name: str, moved_px: float) -> NDArray[np.float64]:
     return np.where(inside, lit, 0.05)
 
 
-def digest(out: Path) -> dict[str, str]:
-    files = [path for path in sorted(out.rglob("*")) if path.is_file() and path.name not in PER_RUN]
-    return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
-
-
 def judged(out: Path) -> dict[str, Any]:
     report: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"))
     return report | {"settings": None}
@@ -127,6 +118,6 @@ def same_in_pieces(clip: Path, folder: Path, words: tuple[str, ...], **options: 
     for piece in words:
         ps.normals(clip, out=folder / "pieces", piece=piece, **given)
     ps.normals(clip, out=folder / "pieces", resume=True, **given)
-    assert digest(folder / "pieces") == digest(folder / "whole")
+    assert digest_of_results(folder / "pieces") == digest_of_results(folder / "whole")
     assert judged(folder / "pieces") == judged(folder / "whole")
     assert not [*folder.glob(".*")]

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from angles import angles_deg
 
 from psvideo.model.surface import Surface
 from psvideo.plates.align.rounds import Aligning, aligned
@@ -60,7 +61,7 @@ class Filmed:
         """Return the mean error over the subject, and which share of it is valid."""
         subject = self.subject(time_s)
         said = surface.valid & subject
-        off_deg = angle_deg(surface.normals, true_normals(self.stage.view(time_s).hits))
+        off_deg = angles_deg(surface.normals, true_normals(self.stage.view(time_s).hits))
         return float(off_deg[said].mean()), float(said.sum() / subject.sum())
 
     def subject(self, time_s: float) -> np.ndarray:
@@ -74,11 +75,6 @@ class Filmed:
 
 def seen(one: Round) -> np.ndarray:
     return np.stack([plate.pixels_seen for plate in one.plates])
-
-
-def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return np.asarray(np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1))))
 
 
 def filmed(lights: int, motion: str, noise: float = 0.0) -> Filmed:
