@@ -12,7 +12,7 @@ from ring_and_ball import ring
 from psvideo.model.surface import MEASURED, Misfit, Reflectance, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust import few_checked, signs
 

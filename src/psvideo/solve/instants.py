@@ -21,7 +21,7 @@ from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.metal.metal_fit import metal_of
 from psvideo.solve.normals.robust.reflectance import reflectance_of
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.solving import Solving, most_claimed_deg
 from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.passes.asked_passes import AskedPasses, Passes, passes_of

@@ -17,7 +17,7 @@ from psvideo.solve.normals.lit_plates import LitPlates, Plates
 from psvideo.solve.normals.plate_noise import PlateNoise, noise_of
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import LIGHTS_FOR_REFLECTANCE
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Looks, Usable
 from psvideo.solve.normals.trust.doubts import Doubts

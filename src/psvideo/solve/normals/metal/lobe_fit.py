@@ -13,7 +13,7 @@ from scipy.optimize import nnls  # type: ignore[attr-defined]  # its stubs leave
 
 from psvideo.compute.ranks import median
 from psvideo.model.arrays import Doubles
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 
 REWEIGHTED, SCALED = 8, 2
 """Steps of weights, and of scales in each."""

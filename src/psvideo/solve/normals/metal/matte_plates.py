@@ -16,7 +16,7 @@ from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.metal.lobe_fit import FARTHEST_DEG, directions
 from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance import points_at
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.task import Samples, Usable
 
 MOST_LEFT = 0.5

@@ -17,18 +17,9 @@ from psvideo.solve.normals.metal.lobe_fit import (
     unlike_shown,
     unlike_under,
 )
-from psvideo.solve.normals.robust.reflectance_fit import (
-    LEAST_POINTS,
-    ON_A_RING,
-    Kind,
-    Sought,
-    SubjectPoints,
-    alternated,
-    joined,
-    off_a_ring,
-    parts_of,
-    sizes_of,
-)
+from psvideo.solve.normals.robust.reflectance_fit import ON_A_RING, off_a_ring
+from psvideo.solve.normals.robust.reflectance_model import Kind, Sought, alternated, parts_of
+from psvideo.solve.normals.robust.subject_points import LEAST_POINTS, SubjectPoints, joined, sizes_of
 
 LIGHTS_FOR_METAL = 7
 """Under six some pixels find where lamps are mirrored on the wrong side: of what is trusted 5 % is over 10 degrees."""

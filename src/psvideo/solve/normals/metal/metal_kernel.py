@@ -1,6 +1,6 @@
 """Loops over points of metal: what lobes show, the normal that explains a point best, and what it would show matte.
 
-Arrays are those of ``reflectance_fit.SubjectPoints``: (light, point), directions (light, point, 3). What is compared
+Arrays are those of ``SubjectPoints``: (light, point), directions (light, point, 3). What is compared
 are square roots of brightness, of which shot noise is as large in the dark as in a highlight: of light itself,
 highlights alone would count. A point's own scale is free.
 """

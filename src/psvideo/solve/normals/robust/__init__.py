@@ -11,6 +11,7 @@
 4. ``odd_of_four``: which of four measurements that contradict each other is left out
 5. ``predicted_error``: each normal's standard error
 
-Where a subject is not matte, ``reflectance`` takes points of it, ``reflectance_fit`` fits to them how it reflects
-light (its loops are ``reflectance_kernel``), and ``reflecting`` solves its pixels again with that.
+Where a subject is not matte, ``reflectance`` takes points of it (``subject_points``), ``reflectance_fit`` finds which
+kind of ``reflectance_model`` fits them (its loops are ``reflectance_kernel``), and ``reflecting`` solves its pixels
+again with that.
 """

@@ -19,8 +19,8 @@ from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust.first_look import first_look
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
-from psvideo.solve.normals.robust.reflectance_fit import SubjectPoints
 from psvideo.solve.normals.robust.solution import Solution
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.robust.weighing import Reweighting, limit_deg, weights
 from psvideo.solve.normals.task import Looks, Usable
 

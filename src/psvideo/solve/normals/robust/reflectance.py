@@ -12,7 +12,8 @@ from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.noise_samples import rows_of
-from psvideo.solve.normals.robust.reflectance_fit import LEAST_POINTS, SubjectPoints, fitted, joined
+from psvideo.solve.normals.robust.reflectance_fit import fitted
+from psvideo.solve.normals.robust.subject_points import LEAST_POINTS, SubjectPoints, joined
 from psvideo.solve.normals.robust.sure_of_motion import sure_of_motion
 from psvideo.solve.normals.task import Samples, Usable
 

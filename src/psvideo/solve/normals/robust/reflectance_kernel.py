@@ -1,6 +1,6 @@
 """The reflectance fit's loops over points and lights, compiled: numpy takes longer to call than to add up so few.
 
-Arrays are those of ``reflectance_fit.SubjectPoints``: (light, point), directions (light, point, 3) and (point, 3).
+Arrays are those of ``SubjectPoints``: (light, point), directions (light, point, 3) and (point, 3).
 """
 
 import numpy as np

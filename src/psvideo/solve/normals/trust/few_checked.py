@@ -19,19 +19,12 @@ from psvideo.solve.normals.robust.reflectance import FEWEST, ROWS, points_at
 from psvideo.solve.normals.robust.reflectance_fit import (
     FOR_SHINE,
     LEAST_EXPLAINED,
-    LEAST_POINTS,
     LEAST_ROUGH,
     LEAST_SOFT,
     MUCH_LESS_LEFT,
-    ROUGH,
-    SOFT,
-    Kind,
-    Sought,
-    SubjectPoints,
-    alternated,
-    explained_evenly,
-    sizes_of,
 )
+from psvideo.solve.normals.robust.reflectance_model import ROUGH, SOFT, Kind, Sought, alternated, explained_evenly
+from psvideo.solve.normals.robust.subject_points import LEAST_POINTS, SubjectPoints, sizes_of
 
 FEWEST_LIGHTS = 4
 """Three lights leave nothing that a model could explain."""
