@@ -19,8 +19,7 @@ from psvideo.model.timing import Timing
 from psvideo.sync import frames_taken
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.coarse import retime
-from psvideo.sync.rowfit.coarse import seed as seed_module
+from psvideo.sync.rowfit.coarse import retime, seed_choice
 from psvideo.sync.rowfit.coarse.search import losses, search, turned_clocks
 from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.fit import ClipFit, find
@@ -784,7 +783,7 @@ def test_a_clip_of_another_plan_is_searched_under_other_numberings_once(
         calls.append(args)
         return searched(*args, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(seed_module, "regular_numberings", counted)
+    monkeypatch.setattr(seed_choice, "regular_numberings", counted)
     film = make_plan(height_px=ROWS, width_px=COLUMNS)
     planned = with_camera(film, fps=film.camera.fps * 5 / 6, exposure_s=1.2 * film.camera.exposure_s)
     with pytest.raises(NoStrobeError, match="frames a second"):

@@ -15,8 +15,9 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.sync.find import timing_from_rows
 from psvideo.sync.rowfit.coarse import seed as seed_module
+from psvideo.sync.rowfit.coarse import seed_choice
 from psvideo.sync.rowfit.coarse.retime import Numbering, regular_step, twins
-from psvideo.sync.rowfit.coarse.seed import find_seed, other_seeds
+from psvideo.sync.rowfit.coarse.seed_choice import find_seed, other_seeds
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import followed, memory_frames
@@ -230,7 +231,7 @@ def test_a_clock_within_1100_ppm_is_found_at_once_for_any_tolerance_of_the_plan(
     Over a stretch as long as those of plans with many lights, short flashes slip by more than their length.
     """
     monkeypatch.setattr(seed_module, "SEED_FRAMES", 120)
-    monkeypatch.setattr(seed_module, "UNKNOWN_CLOCK_PPM", 100.0)  # the widest search finds it too, late
+    monkeypatch.setattr(seed_choice, "UNKNOWN_CLOCK_PPM", 100.0)  # the widest search finds it too, late
     plan = make_plan(height_px=160, width_px=12, duration_s=0.00025, clock_tolerance_ppm=100)
     seed = find_seed(plan, profiles_of(plan, shot_of(plan, 120, 999.0)))
     assert seed.frames == slice(0, 120)

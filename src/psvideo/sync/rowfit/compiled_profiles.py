@@ -12,6 +12,7 @@ from psvideo.model.timing import Timing
 from psvideo.sync.rowfit import kernel, projection, row_model
 from psvideo.sync.rowfit.beat import Beat, train_between
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.row_slopes import SIGNALS
 
 WORTH_A_THREAD = 40_000
 """Samples of one part of the work; with fewer, starting a thread costs more than it saves."""
@@ -104,9 +105,9 @@ def equations(
         row_model.places(seen, flashes, place)
 
     def run(first: int, last: int) -> tuple[Doubles, Doubles, Doubles]:
-        hessian = np.zeros((len(rows.window_start), row_model.SIGNALS, row_model.SIGNALS))
-        score = np.zeros((len(rows.value), row_model.SIGNALS))
-        apart = np.zeros((len(rows.window_start), row_model.PLACES if honest else 0, row_model.SIGNALS))
+        hessian = np.zeros((len(rows.window_start), SIGNALS, SIGNALS))
+        score = np.zeros((len(rows.value), SIGNALS))
+        apart = np.zeros((len(rows.window_start), row_model.PLACES if honest else 0, SIGNALS))
         projection.equations(
             seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score, place, apart
         )

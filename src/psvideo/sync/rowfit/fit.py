@@ -9,7 +9,8 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.best_fit import BestFit, best_fit
 from psvideo.sync.rowfit.coarse.retime import regular_step, stood_in
-from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
+from psvideo.sync.rowfit.coarse.seed import Seed, renumbered
+from psvideo.sync.rowfit.coarse.seed_choice import find_seed
 from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
 from psvideo.sync.rowfit.profiles import Profiles

@@ -8,12 +8,7 @@ import numpy as np
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.arrays import Doubles
-from psvideo.sync.rowfit.row_model import (
-    Flashes,
-    Rows,
-    see_all,
-    width,
-)
+from psvideo.sync.rowfit.row_model import Flashes, Rows, see_all, width
 from psvideo.sync.rowfit.unknowns.whitening import factors, whiten, whiten_all
 
 RIDGE = 1e-6

@@ -12,22 +12,10 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import EXACT
 from psvideo.compute.memory import lent
 from psvideo.model.arrays import Doubles
+from psvideo.sync.rowfit.given_off import given_off
 from psvideo.sync.rowfit.kernel import fit_window, solve_factored
-from psvideo.sync.rowfit.row_model import (
-    BLUR,
-    LEFT,
-    RIGHT,
-    RISE,
-    SIGNALS,
-    Flashes,
-    Rows,
-    given_off,
-    lent_flashes,
-    lent_rows,
-    see,
-    slopes,
-    width,
-)
+from psvideo.sync.rowfit.row_model import Flashes, Rows, lent_flashes, lent_rows, see, width
+from psvideo.sync.rowfit.row_slopes import BLUR, LEFT, RIGHT, RISE, SIGNALS, slopes
 from psvideo.sync.rowfit.unknowns.whitening import factors, whiten, whiten_all
 
 MOST_LEVERAGE = 0.9

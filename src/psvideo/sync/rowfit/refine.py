@@ -11,7 +11,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.normal_equations import projected, solved
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.row_model import BLUR, EXPOSURE, FALL, RISE, ROW_TIME
+from psvideo.sync.rowfit.row_slopes import BLUR, EXPOSURE, FALL, RISE, ROW_TIME
 from psvideo.sync.rowfit.standard_error import believable, mean_error, standard_error_of
 
 CAUCHY = 2.4
@@ -69,7 +69,7 @@ def refine(
 ) -> Fit:
     """Fit shift and clock ratio, and the times named in ``free``, by steps that are taken only as far as they help."""
     beat, rest, weight, trust = _stepped(plan, rows, beat, free=free, steps=steps, first_scale=first_scale)
-    basis, unit_s = _straight(rows, free), _units(plan, rows, free)
+    basis, unit_s = straight_basis(rows, free), units_of(plan, rows, free)
     covariance, alike_s = believable(plan, rows, beat, weight, trust, basis, prior(unit_s, free))
     return Fit(
         beat=beat,
@@ -98,7 +98,7 @@ def refined_beat(
 def _stepped(
     plan: Plan, rows: Profiles, beat: Beat, *, free: tuple[str, ...], steps: int, first_scale: float
 ) -> _Stepped:
-    basis, unit_s = _straight(rows, free), _units(plan, rows, free)
+    basis, unit_s = straight_basis(rows, free), units_of(plan, rows, free)
     rest = unexplained(plan, rows, beat)
     weight = trust = np.ones_like(rest)
     for step in range(steps):
@@ -113,52 +113,7 @@ def _stepped(
     return _Stepped(beat, rest, weight, trust)
 
 
-def clearest(
-    plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], names: tuple[str, ...], *, at_least: float
-) -> str | None:
-    """Return the time that would explain most if it were free (a score test), or None where none explains enough."""
-    for share in (WIDE_SCALE, 0.0) if names else ():
-        gains = _gains(plan, rows, fit, free, names, share=share, at_least=at_least)
-        if gains:
-            return max(gains, key=lambda name: gains[name])
-    return None
-
-
-def _gains(
-    plan: Plan,
-    rows: Profiles,
-    fit: Fit,
-    free: tuple[str, ...],
-    names: tuple[str, ...],
-    *,
-    share: float,
-    at_least: float,
-) -> dict[str, float]:
-    """Return what the times would explain that explain enough; residuals count up to a share of their row's spread."""
-    every = (*free, *names)
-    scale = errors_of_residuals(rows, fit.rest, share)
-    weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
-    _, hessian, scores, _ = projected(plan, rows, fit.beat, weight, _straight(rows, every), tails=True)
-    gains: dict[str, float] = {}
-    for name in names:
-        kept = [*range(2 + len(free)), 2 + every.index(name)]
-        part, pulls = hessian[np.ix_(kept, kept)], scores[:, kept]
-        known = prior(_units(plan, rows, (*free, name)), (*free, name))
-        move = solved(part + known, pulls.sum(axis=0))
-        gain = float(move @ part @ move)
-        if gain > at_least and _may_move(rows, fit.beat, name, float(move[-1])):
-            gains[name] = gain
-    return gains
-
-
-def _may_move(rows: Profiles, beat: Beat, name: str, move: float) -> bool:
-    """Return whether a time has room to move: tails are not negative, exposures not longer than the frame."""
-    if move < 0:
-        return bool(getattr(beat, name) > 0)
-    return name != "exposure_s" or beat.exposure_s < rows.period_s * (1 - 1e-9)
-
-
-def _straight(rows: Profiles, free: tuple[str, ...]) -> Doubles:
+def straight_basis(rows: Profiles, free: tuple[str, ...]) -> Doubles:
     """Return the columns by which shift and slope move the knots, and each free time itself."""
     ends_s = rows.ends_s
     pivot_s, half_s = _pivot(rows)
@@ -175,7 +130,7 @@ def _pivot(rows: Profiles) -> tuple[float, float]:
     return float(start_s.mean()), max(float(start_s[-1] - start_s[0]) / 2, rows.period_s)
 
 
-def _units(plan: Plan, rows: Profiles, free: tuple[str, ...]) -> Doubles:
+def units_of(plan: Plan, rows: Profiles, free: tuple[str, ...]) -> Doubles:
     """Return a fiftieth of a flash in every unknown, which is small for all of them."""
     shortest_s = 0.02 * plan.shortest_flash_s
     return np.array([shortest_s] * 2 + [shortest_s / (rows.place.max() if n == "row_time_s" else 1.0) for n in free])

@@ -15,7 +15,8 @@ from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.retime import stood_in
-from psvideo.sync.rowfit.coarse.seed import Seed, find_seed, renumbered
+from psvideo.sync.rowfit.coarse.seed import Seed, renumbered
+from psvideo.sync.rowfit.coarse.seed_choice import find_seed
 from psvideo.sync.rowfit.compiled_profiles import brightnesses, unexplained
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.leaps import FINE_PARTS, LEAST_AFTER, leap

@@ -1,9 +1,8 @@
-"""The row model, compiled: what each row of a frame saw of the flashes, and how that changes with the times.
+"""The row model, compiled: what each row of a frame saw of the flashes.
 
 A row's mean in frame n is ``ambient + sum_k (F(close - s_k) - F(open - s_k)) * brightness[slot of k]``, F being the
-share of its light that a flash has given off (an exponential rise and fall, 1/e times, round a square pulse). The
-flashes' weights equal ``shutter.row_weights`` where there are no tails; a test holds the two together. Compression and
-scaling blur rows as if every flash were spread out evenly to either side, which is a time as well.
+share of its light that a flash has given off (``given_off``). The flashes' weights equal ``shutter.row_weights`` where
+there are no tails; a test holds the two together. How a row changes with the unknown times is ``row_slopes``.
 """
 
 from typing import NamedTuple
@@ -14,16 +13,7 @@ from psvideo.compute.compiled import EXACT
 from psvideo.compute.memory import lent
 from psvideo.model.arrays import Doubles, Integers
 from psvideo.model.rows.shutter import REACH
-
-OVER = 40.0
-"""After this many, double precision cannot tell that it is not."""
-LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL, BLUR = range(7)
-"""The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time, blur."""
-SIGNALS = 7
-SPREAD = 3.0**0.5
-"""Three points, at these standard deviations with weights 1, 4 and 1, blur as a Gaussian (Gauss-Hermite quadrature).
-No row takes light from nearer than the next one: where a blur is less than that, the outer points are there, and weigh
-less."""
+from psvideo.sync.rowfit.given_off import OVER, given_off, reach_s, share_between
 
 PARTS = 8
 PLACES = 2 * PARTS + 1
@@ -78,49 +68,6 @@ def lent_flashes(flashes: Flashes) -> Flashes:
         lent(flashes.start_s), lent(flashes.duration_s), lent(flashes.unknown), flashes.unknowns, flashes.rise_s,
         flashes.fall_s, flashes.blur_s, flashes.row_s,
     )  # fmt: skip
-
-
-@EXACT.kept
-def reach_s(blur_s: float, row_s: float) -> float:
-    """Return how far a blur takes light from, 0 where there is none."""
-    return max(SPREAD * blur_s, row_s) if blur_s > 0.0 else 0.0
-
-
-@EXACT.kept
-def given_off(
-    since_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float, row_s: float
-) -> tuple[float, float]:
-    """Return the share of its light that a flash has given off, and the rate at which it does so now."""
-    share, rate = _sharp(since_s, duration_s, rise_s, fall_s)
-    if blur_s <= 0.0:
-        return share, rate
-    apart_s = reach_s(blur_s, row_s)
-    outer = 0.5 * (blur_s / apart_s) ** 2
-    before, rate_before = _sharp(since_s - apart_s, duration_s, rise_s, fall_s)
-    after, rate_after = _sharp(since_s + apart_s, duration_s, rise_s, fall_s)
-    inner = 1.0 - 2.0 * outer
-    return inner * share + outer * (before + after), inner * rate + outer * (rate_before + rate_after)
-
-
-@EXACT.kept
-def _sharp(since_s: float, duration_s: float, rise_s: float, fall_s: float) -> tuple[float, float]:
-    """Return the share and the rate where nothing is blurred."""
-    if since_s <= 0.0:
-        return 0.0, 0.0
-    reached, whole = 1.0, duration_s
-    if rise_s > 0.0:
-        reached = 1.0 - np.exp(-duration_s / rise_s)
-        whole -= rise_s * reached
-    whole += reached * fall_s
-    if since_s < duration_s:
-        if rise_s > 0.0:
-            lit = 1.0 - np.exp(-since_s / rise_s)
-            return (since_s - rise_s * lit) / whole, lit / whole
-        return since_s / whole, 1.0 / whole
-    if fall_s <= 0.0:
-        return 1.0, 0.0
-    left = reached * np.exp(-(since_s - duration_s) / fall_s)
-    return 1.0 - fall_s * left / whole, left / whole
 
 
 @EXACT.kept
@@ -226,66 +173,6 @@ def _see_sharp(frame_start_s: Doubles, offset_s: float, exposure_s: float, flash
             j += 1
 
 
-@EXACT.called
-def _share(
-    open_s: float, close_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float, row_s: float
-) -> float:
-    """Return the share of a flash that is given off between two times since its start."""
-    after, _ = given_off(close_s, duration_s, rise_s, fall_s, blur_s, row_s)
-    before, _ = given_off(open_s, duration_s, rise_s, fall_s, blur_s, row_s)
-    return after - before
-
-
-@EXACT.called
-def _add_tail_slopes(
-    flashes: Flashes, d: float, open_s: float, close_s: float, seen: float, light: float, probe_s: float,
-    signals: Doubles,
-) -> None:  # fmt: skip
-    """Add how a flash's light changes with its tails: the difference to tails that are ``probe_s`` longer."""
-    rise_s, fall_s, blur_s, row_s = flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
-    signals[RISE] += light * (_share(open_s, close_s, d, rise_s + probe_s, fall_s, blur_s, row_s) - seen) / probe_s
-    signals[FALL] += light * (_share(open_s, close_s, d, rise_s, fall_s + probe_s, blur_s, row_s) - seen) / probe_s
-    if blur_s > 0.0:
-        signals[BLUR] += light * (_share(open_s, close_s, d, rise_s, fall_s, blur_s + probe_s, row_s) - seen) / probe_s
-
-
-@EXACT.kept
-def slopes(
-    rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: Doubles, tails: bool, signals: Doubles
-) -> float:
-    """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
-    open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
-    close_s = open_s + rows.exposure_s
-    rise_s, fall_s, blur_s, row_s = flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
-    probe_s = 0.01 * flashes.duration_s[0]
-    near_s = reach_s(blur_s, row_s)
-    tail_s = REACH * fall_s + near_s
-    before_s = near_s + (SPREAD * probe_s if tails else 0.0)
-    over_s = OVER * (fall_s + (probe_s if tails else 0.0)) + before_s
-    signals[:] = 0.0
-    j = k
-    while j > 0 and flashes.start_s[j - 1] + flashes.duration_s[j - 1] + tail_s + REACH * probe_s > open_s:
-        j -= 1
-    closing = opening = 0.0
-    while j < len(flashes.start_s) and flashes.start_s[j] - near_s < close_s:
-        u, d = flashes.unknown[j], flashes.duration_s[j]
-        since_close_s, since_open_s = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
-        is_whole = since_open_s <= -before_s and since_close_s >= d + over_s  # however it is moved a little
-        if u > 0 and not is_whole:
-            after, after_rate = given_off(since_close_s, d, rise_s, fall_s, blur_s, row_s)
-            before, before_rate = given_off(since_open_s, d, rise_s, fall_s, blur_s, row_s)
-            closing += brightness[u] * after_rate
-            opening += brightness[u] * before_rate
-            if tails:
-                _add_tail_slopes(
-                    flashes, d, since_open_s, since_close_s, after - before, brightness[u], probe_s, signals
-                )
-        j += 1
-    signals[EXPOSURE] = closing
-    signals[ROW_TIME] = (closing - opening) * rows.row_place[row]
-    return opening - closing
-
-
 @EXACT.kept
 def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float:
     """Return the share of flash ``j`` that a row saw in a frame, 0 for a dark slot."""
@@ -293,7 +180,9 @@ def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float
         return 0.0
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s - flashes.start_s[j]
     close_s = open_s + rows.exposure_s
-    return _share(open_s, close_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s)
+    return share_between(
+        open_s, close_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s, flashes.row_s
+    )
 
 
 @EXACT.kept

@@ -8,7 +8,8 @@ from psvideo.model.arrays import Integers
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.retime import regular_step
-from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
+from psvideo.sync.rowfit.coarse.seed import Seed, gain_of, renumbered
+from psvideo.sync.rowfit.coarse.seed_choice import CLEARER, other_seeds
 from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.ends import ends

@@ -9,7 +9,8 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, TAILS, Fit, clearest, robust_loss
+from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, TAILS, Fit, robust_loss
+from psvideo.sync.rowfit.score_test import clearest
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, FEIGNED, blurred_s, cleared, plausible, within_blur
 
