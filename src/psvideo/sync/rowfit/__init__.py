@@ -17,5 +17,6 @@ Rooms, in the order in which a fit goes through them:
 - ``tracking``: one course of the strobe through the whole take
 - ``unknowns``: what else may be free besides the times, where the data call for it
 
-Beside them, ``whatever_moves`` finds the strobe where a subject is too fast for a fit: it asks no brightness to stay.
+Beside them, ``whatever_moves`` finds the strobe where a subject is too fast for a fit: it asks no brightness to stay,
+but what frames that share a flash say (``shared_light``).
 """

@@ -12,8 +12,9 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, maybe_otherwise_s, straightened
+from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, straightened
 from psvideo.sync.rowfit.unknowns.freed import Freed, freed
+from psvideo.sync.rowfit.unknowns.plan_errors import maybe_otherwise_s
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import restless
 

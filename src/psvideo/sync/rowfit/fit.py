@@ -17,9 +17,11 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
-from psvideo.sync.rowfit.unknowns.curve import nominally_s, straight
-from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, maybe_astray_s, shift_error_s
+from psvideo.sync.rowfit.unknowns.curve import straight
+from psvideo.sync.rowfit.unknowns.edge_pulls import disagreement_s, shift_error_s
+from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, jitter, maybe_astray_s
 from psvideo.sync.rowfit.unknowns.misread import OtherCurve, doubt_s, misread
+from psvideo.sync.rowfit.unknowns.plan_errors import nominally_s
 from psvideo.sync.rowfit.unknowns.restless import across
 from psvideo.sync.rowfit.unknowns.softness import misfit
 from psvideo.sync.rowfit.unknowns.unsteady import unsteady_s

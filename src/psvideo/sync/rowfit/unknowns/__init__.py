@@ -1,7 +1,12 @@
 """What else may be free besides the times, where the data call for it.
 
-Of the plan: ``freed`` (durations, dark times and a readout that it has wrong), ``softness`` (tails of the LEDs),
-``curve`` (footage whose transfer curve is a little off), ``misread`` (another curve altogether). Of the clocks:
-``bend`` (they drift), ``jitter``, ``unsteady`` (they jump by little). Of the scene: ``mains_swing`` (room light on the
-mains), ``restless`` with ``whitening`` (subjects that move). ``plateau``: times that no row shows.
+- of the plan: ``freed`` (exposure, readout and tails that it has wrong), with ``softness`` for whether edges are soft;
+  ``plan_errors`` (what stays in doubt where they are not free)
+- of the footage: ``curve`` (its transfer curve is a little off, by what ``small_steps`` would explain), ``misread``
+  (it has another curve altogether)
+- of the clocks: ``bend`` (they drift), ``jitter`` (flashes come early or late one by one, as ``edge_pulls`` say),
+  ``unsteady`` (they jump by little)
+- of the scene: ``mains_swing`` (room light on the mains), ``restless`` with ``whitening`` (subjects that move)
+
+``plateau``: times that no row shows.
 """

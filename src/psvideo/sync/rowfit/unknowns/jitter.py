@@ -1,4 +1,4 @@
-"""What a smooth clock leaves: flashes that each come a little early or late, and how certain all times are.
+"""What a smooth clock leaves: flashes that each come a little early or late.
 
 Rows that open during a flash and rows that close during it show its time independently of one another. What both say
 alike is jitter, what they say differently is noise; so jitter is believed, and noise shrunk away, without a model of
@@ -6,19 +6,18 @@ either (empirical Bayes).
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit import projection
 from psvideo.sync.rowfit.coarse.seed import gain_of
-from psvideo.sync.rowfit.compiled_profiles import compiled_flashes, compiled_rows, equations
+from psvideo.sync.rowfit.compiled_profiles import compiled_flashes, compiled_rows
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, errors_of_residuals
+from psvideo.sync.rowfit.refine import Fit, errors_of_residuals
 from psvideo.sync.rowfit.row_model import Flashes, places
+from psvideo.sync.rowfit.unknowns.edge_pulls import moved_flashes, pulls
 
 LEAST_FLASHES = 8
 SURE = 5.0
@@ -41,10 +40,6 @@ ROWS_OVER, ALONE_OVER, ALIKE_ROWS = 20.0, 1.0, 0.1
 Where neighbouring rows that no edge touches err alike by no more than the third (a correlation), the second does."""
 LEAST_ROWS = 400
 """Fewer pairs of neighbouring rows do not show whether they err alike."""
-CHANCE = 2.0
-"""Standard errors by which openings and closings may disagree by chance."""
-ROW_BLOCKS = 8
-"""Blocks of rows whose errors are taken as independent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,56 +166,3 @@ def _agreed(pull: Doubles, stiff: Doubles, *, over: float, sure: float = SURE) -
         return None
     noise = float(((apart[:, 0] - apart[:, 1]) ** 2 / (1.0 / stiff[timed]).sum(axis=1)).mean())
     return float(np.sqrt(common)), noise
-
-
-def moved_flashes(flashes: Flashes, late_s: Doubles) -> Flashes:
-    """Return the flashes as late as they were found; they stay in order."""
-    return flashes._replace(start_s=np.maximum.accumulate(flashes.start_s + late_s))
-
-
-def pulls(
-    rows: Profiles, fit: Fit, flashes: Flashes, among: slice | NDArray[np.bool_] = slice(None), *, robust: bool = True
-) -> tuple[Doubles, Doubles]:
-    """Return how strongly rows that open and rows that close shift each flash, shape (flash, 2) twice.
-
-    ``rows`` are those ``among`` the fit's own. Not ``robust``, large residuals pull as much as they are large.
-    """
-    seen = compiled_rows(rows, fit.beat)
-    pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
-    rest = np.ascontiguousarray(fit.rest[:, among])
-    scale = errors_of_residuals(rows, rest, WIDE_SCALE)
-    trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) if robust else np.ones_like(rest)
-    projection.edges(seen, flashes, trust / scale**2, 0, rows.value.shape[1], pull, stiff)
-    return pull, stiff
-
-
-def disagreement_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
-    """Return by how much rows that open and rows that close disagree on the flashes' times, beyond chance.
-
-    Half their distance is as large as the standard error where noise is all that parts them; blurred rows part them
-    further, and that much the times are in doubt.
-    """
-    pull, stiff = pulls(rows, fit, compiled_flashes(plan, rows, fit.beat))
-    if stiff.sum(axis=0).min() <= 0.0:
-        return 0.0
-    opening_s, closing_s = pull.sum(axis=0) / stiff.sum(axis=0)
-    return float(np.sqrt(max((0.5 * (opening_s - closing_s)) ** 2 - (CHANCE * fit.shift_error_s) ** 2, 0.0)))
-
-
-def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
-    """Return the standard error of the common shift as blocks of rows give it, which a moving subject upsets."""
-    edges = np.linspace(0, rows.value.shape[1], ROW_BLOCKS + 1).astype(int)
-    if np.diff(edges).min() == 0:
-        return 0.0
-    each, stiff = [], []
-    for first, last in pairwise(edges.tolist()):
-        block = rows.only_rows(slice(first, last))
-        weight = np.ascontiguousarray(fit.weight[:, first:last])
-        found = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
-        each.append(found.frame[:, :2].sum())
-        stiff.append(found.windows[:, :2, :2].sum())
-    pull, whole = np.array(each), float(np.sum(stiff))
-    if whole <= 0.0:
-        return 0.0
-    pull -= np.array(stiff) * pull.sum() / whole
-    return float(np.sqrt(ROW_BLOCKS / (ROW_BLOCKS - 1) * (pull**2).sum()) / whole)

@@ -11,7 +11,8 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.compiled_profiles import compiled_flashes
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
-from psvideo.sync.rowfit.unknowns.jitter import ENOUGH, SURE, Jitter, moved_flashes, pulls
+from psvideo.sync.rowfit.unknowns.edge_pulls import moved_flashes, pulls
+from psvideo.sync.rowfit.unknowns.jitter import ENOUGH, SURE, Jitter
 
 STRETCH = 4
 """Flashes of a stretch."""
