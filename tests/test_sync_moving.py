@@ -22,7 +22,7 @@ from psvideo.sync.rowfit.refine import Fit, robust_loss
 from psvideo.sync.rowfit.row_model import seen_of
 from psvideo.sync.rowfit.tracking.false_holes import without_false_holes
 from psvideo.sync.rowfit.tracking.track import FrameTrack
-from psvideo.sync.rowfit.unknowns.freed import taken_away
+from psvideo.sync.rowfit.unknowns.likelier import taken_away
 from psvideo.sync.rowfit.unknowns.whitening import factors, whiten
 from psvideo.synth import TrueFlash
 

@@ -13,7 +13,8 @@ from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.curve import Curve, Straightened, straightened
-from psvideo.sync.rowfit.unknowns.freed import Freed, freed
+from psvideo.sync.rowfit.unknowns.freed import freed
+from psvideo.sync.rowfit.unknowns.likelier import Freed
 from psvideo.sync.rowfit.unknowns.plan_errors import maybe_otherwise_s
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import restless
