@@ -18,9 +18,11 @@ from psvideo.model.surface import Metal, RivalLobes, Subject, Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.metal.lobe_fit import directions
+from psvideo.solve.normals.metal.lobe_kernel import fill_sums, fill_unlike
+from psvideo.solve.normals.metal.matte_kernel import fill_matte
 from psvideo.solve.normals.metal.matte_plates import matte_plates, metal_doubt_deg
 from psvideo.solve.normals.metal.metal_fit import metal_of
-from psvideo.solve.normals.metal.metal_kernel import fill_matte, fill_sums, fill_unlike, find_normals
+from psvideo.solve.normals.metal.metal_normals import find_normals
 from psvideo.solve.normals.solving import Solving
 
 Array = NDArray[np.float64]

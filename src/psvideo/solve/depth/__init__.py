@@ -1,7 +1,8 @@
 """From normals to shape: depth along the camera's axis, and a mesh cut where depth jumps.
 
 ``view`` says how normals and depth belong together. ``cao2022`` finds the height with its jumps: ``integration`` and
-``reweighting`` go round, ``multigrid`` solves each round (``checkerboard`` and ``torn_blocks`` hold its grids).
+``reweighting`` go round, ``multigrid`` solves each round (``checkerboard`` holds its grids; ``torn_blocks`` and
+``between_blocks`` make the coarser ones).
 ``simchony1990`` is the fast path for whole rectangles. ``scale`` gives the height a scale by its ``anchors``,
 ``shaping`` keeps that over a clip, and ``mesh`` makes triangles of it. Under near lights ``torn_surfaces`` says what is
 integrated apart, and ``placing`` how far away it is, by ``falloff_evidence``.

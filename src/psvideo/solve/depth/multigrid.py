@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import REORDERED
 from psvideo.compute.spilled import room_apart
 from psvideo.model.arrays import Floats
+from psvideo.solve.depth.between_blocks import coarsen, coarsen_pins, mend, prolong_moved, restrict_moved
 from psvideo.solve.depth.checkerboard import ascend, descend, empty_board, invert, pull, settle
-from psvideo.solve.depth.torn_blocks import OWN, coarsen, coarsen_pins, mend, part, prolong_moved, restrict_moved
+from psvideo.solve.depth.torn_blocks import OWN, part
 
 COARSEST_PIXELS = 64
 COARSEST_SWEEPS = 12

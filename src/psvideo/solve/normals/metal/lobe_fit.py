@@ -78,7 +78,7 @@ def followed(points: SubjectPoints, first: Doubles, *, times: int) -> LobesAndNo
 
 def normals_under(points: SubjectPoints, numbers: Doubles) -> Doubles:
     """Return the normals (point, 3) that explain points best under given lobes."""
-    from psvideo.solve.normals.metal.metal_kernel import find_normals
+    from psvideo.solve.normals.metal.metal_normals import find_normals
 
     normals, starts = np.empty_like(points.normals), directions(APART_DEG, FARTHEST_DEG)
     find_normals(points.measured, points.seen, points.towards, points.half, starts, numbers, normals)
@@ -88,7 +88,7 @@ def normals_under(points: SubjectPoints, numbers: Doubles) -> Doubles:
 def lobes_of(points: SubjectPoints, normals: Doubles, *, lit_from_around: bool = False) -> LobesAndNormals:
     """Return the lobes that explain points with these normals best, each point in a scale of its own; and where
     ``lit_from_around``, light of every lamp that reaches all points alike, shadows as well."""
-    from psvideo.solve.normals.metal.metal_kernel import LOBES, fill_shown
+    from psvideo.solve.normals.metal.lobe_kernel import LOBES, fill_shown
 
     parts = np.empty((1 + 2 * LOBES, *points.measured.shape))
     fill_shown(np.ascontiguousarray(normals), points.towards, points.half, parts)
@@ -119,7 +119,7 @@ def _per_root(seen: Doubles, root: Doubles, shown: Doubles) -> tuple[Doubles, Do
 
 def unlike_shown(points: SubjectPoints, shown: Doubles) -> Doubles:
     """Return the share of every point's light that is not what is ``shown`` (light, point)."""
-    from psvideo.solve.normals.metal.metal_kernel import fill_unlike
+    from psvideo.solve.normals.metal.lobe_kernel import fill_unlike
 
     unlike = np.empty(shown.shape[1])
     fill_unlike(points.measured, points.seen, np.ascontiguousarray(shown), unlike)
@@ -128,7 +128,7 @@ def unlike_shown(points: SubjectPoints, shown: Doubles) -> Doubles:
 
 def unlike_under(points: SubjectPoints, numbers: Doubles, normals: Doubles) -> Doubles:
     """Return the share of every point's light that lobes leave of it with these normals (point, 3)."""
-    from psvideo.solve.normals.metal.metal_kernel import fill_sums
+    from psvideo.solve.normals.metal.lobe_kernel import fill_sums
 
     shown = np.empty_like(points.measured)
     fill_sums(normals, points.towards, points.half, numbers, shown)

@@ -80,29 +80,30 @@ def _asked(solved: Surface, mask: Mask | None, first: int, last: int) -> tuple[N
 def _factors(points: SubjectPoints, bright: Doubles, starts: Doubles, numbers: Doubles) -> Doubles:
     """Return for every measurement (light, point) what a matte surface would show over what is there; 1 where it is not
     ``bright`` (0 or 1), and in pixels that are no metal."""
-    from psvideo.solve.normals.metal import metal_kernel as kernel
+    from psvideo.solve.normals.metal.matte_kernel import fill_matte
 
     ways = points.towards, points.half
     normals, left = _as_metal(points, starts, numbers)
     shown = np.empty_like(points.measured)
-    kernel.fill_matte(points.measured, bright, *ways, normals, numbers, shown)
+    fill_matte(points.measured, bright, *ways, normals, numbers, shown)
     wanted = (left <= MOST_LEFT) & (bright > 0) & (points.measured > 0)
     return np.asarray(np.where(wanted, shown / np.maximum(points.measured, 1e-9), 1.0))
 
 
 def _as_metal(points: SubjectPoints, starts: Doubles, numbers: Doubles) -> tuple[Doubles, Doubles]:
     """Return the normals of points as metal, and what metal leaves of them over what a matte surface does."""
-    from psvideo.solve.normals.metal import metal_kernel as kernel
+    from psvideo.solve.normals.metal.lobe_kernel import fill_sums, fill_unlike
+    from psvideo.solve.normals.metal.metal_normals import find_normals
 
     ways = points.measured, points.seen, points.towards, points.half
     normals, lambert = np.empty_like(points.normals), np.zeros_like(numbers)
     lambert[0] = 1.0
     matte, metal = np.empty(len(normals)), np.empty(len(normals))
-    kernel.find_normals(*ways, starts, numbers, normals)
+    find_normals(*ways, starts, numbers, normals)
     for found, facing, one in ((matte, points.normals, lambert), (metal, normals, numbers)):
         shown = np.empty_like(points.measured)
-        kernel.fill_sums(facing, points.towards, points.half, one, shown)
-        kernel.fill_unlike(points.measured, points.seen, shown, found)
+        fill_sums(facing, points.towards, points.half, one, shown)
+        fill_unlike(points.measured, points.seen, shown, found)
     return normals, metal / np.maximum(matte, 1e-9)
 
 
