@@ -114,40 +114,55 @@ def gather(
     """
     check_take(take)
     check_kind("timing", timing, Timing, "a Timing: ps.find_timing(take) or ps.read_timing(path) gives one")
-    plan, flashes = take.plan, timing.flashes
+    plan = take.plan
     if take.unmixing is None:
         check_separable(plan)
     borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
     turn = take.clip.turn
     window = None if each_window is None else lambda found: each_window(upright_window(found, turn))
     made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=window, unseen=borrows)
-    single = _shown(made, each_flash)
-    names, plates = plan.lights, light_plates(single, plan, flashes, start=start_number)
-    if take.unmixing is not None:
-        names, plates = slot_names(plan), slot_plates(single, flashes, start=start_number)
+    plates = _named_plates(take, timing, _shown(made, each_flash), start_number=start_number)
     if borrows and turn.transposed:  # rows are borrowed while they are rows
         plates, borrows = with_nearest_rows(plates), False
     plates = _shown(map(partial(upright, turn=turn), plates), each_plate)
     if not with_ambient:
         plates = filter(lambda plate: plate.light != AMBIENT, plates)
-    if aligning is not None:
-        plates = with_nearest_rows(plates) if borrows else plates
-        due = scheduled(take, timing, aligning, start_number=start_number)
-        rounds = aligned(
-            plates,
-            names,
-            aligning,
-            first=start_number,
-            with_ambient=with_ambient,
-            schedule=due,
-            whites=None if part is None else part.whites,
-            put_by=None if take.kept is None else take.kept.passing_codes,
-        )
-        rounds = _apart(rounds, take)
-        return with_open_shutter(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
+    if aligning is None:
+        return _rounds_as_they_are(take, timing, plates, start_number=start_number)
+    rounds = aligned(
+        with_nearest_rows(plates) if borrows else plates,
+        _names(take),
+        aligning,
+        first=start_number,
+        with_ambient=with_ambient,
+        schedule=scheduled(take, timing, aligning, start_number=start_number),
+        whites=None if part is None else part.whites,
+        put_by=None if take.kept is None else take.kept.passing_codes,
+    )
+    rounds = _apart(rounds, take)
+    return with_open_shutter(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
+
+
+def _names(take: Take) -> tuple[str, ...]:
+    """Return the names of a round's plates: its lights, or where flashes hold several colours, its slots."""
+    return take.plan.lights if take.unmixing is None else slot_names(take.plan)
+
+
+def _named_plates(take: Take, timing: Timing, single: Iterator[Plate], *, start_number: int) -> Iterator[LightPlate]:
+    """Yield the plates of flashes by their lights' names and rounds' numbers, or by those of their slots."""
+    if take.unmixing is None:
+        return light_plates(single, take.plan, timing.flashes, start=start_number)
+    return slot_plates(single, timing.flashes, start=start_number)
+
+
+def _rounds_as_they_are(
+    take: Take, timing: Timing, plates: Iterator[LightPlate], *, start_number: int
+) -> Iterator[Round]:
+    """Yield rounds whose plates are each of their own flash's instant."""
+    names = _names(take)
     if take.unmixing is not None:
         return _apart(gathered(plates, names, expected=lambda _: {*names, AMBIENT}, whole=True), take)
-    expected = coming(plan, flashes, start=start_number)
+    expected = coming(take.plan, timing.flashes, start=start_number)
     return gathered(plates, names, expected=expected.__getitem__)
 
 

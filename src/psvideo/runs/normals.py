@@ -5,7 +5,7 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from psvideo.clip import decoded_once
+from psvideo.clip import Take, decoded_once
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
@@ -30,6 +30,8 @@ from psvideo.model.choices import (
     YDirection,
 )
 from psvideo.model.quantities import Aov
+from psvideo.model.rig import Rig
+from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.named_timing import read_or_find_timing
 from psvideo.plates.sequence import FIRST_NUMBER
@@ -161,8 +163,13 @@ def normals(
     2
     """
     clip_path, rig_given = path_of("clip", clip), path_if_given("rig", rig)
-    going_on = resume or piece is not None
-    output = Output(folder=path_of("out", out), force=force, resume=going_on, start_number=start_number, caller=caller)
+    output = Output(
+        folder=path_of("out", out),
+        force=force,
+        resume=resume or piece is not None,
+        start_number=start_number,
+        caller=caller,
+    )
     output.check()
     asked = Asked(
         preset=preset,
@@ -192,12 +199,9 @@ def normals(
         depth_scale=depth_scale,
     )
     known.check()
-    if not 1 <= denoise <= MOST_AVERAGED:
-        raise UsageError(f"`denoise` {denoise}: expected a number from 1 to {MOST_AVERAGED}.")
+    _check_averaged(denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
-    rig_path = rig_of_take(rig_given, clip_path)
-    if rig_given is None:
-        caller.say(f"The lights stand where {rig_path} says.")
+    rig_path = _said_rig(rig_given, clip_path, caller)
     rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
@@ -207,22 +211,33 @@ def normals(
     delivery = metric_delivery(delivery, asked.aov, lighting, caller)
     timing_path = path_if_given("timing", timing)
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
-    noted = noted_timing(unfinished_folder_of(output.folder)) if going_on and timing_path is None else None
-    job_of = partial(
-        Job,
-        lighting=lighting,
-        delivery=delivery,
-        solver=solver,
-        over_time=over_time,
-        fill=fill,
-        start_number=start_number,
-    )
+    timed = partial(_timed, output=output, path=timing_path, first_light=first_light, rig=lighting.flashed, watch=watch)
     with decoded_once(take, output=output.folder) as kept:
-        found = noted or read_or_find_timing(
-            kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch
+        job = Job(
+            take=kept,
+            timing=timed(kept),
+            lighting=lighting,
+            delivery=delivery,
+            solver=solver,
+            over_time=over_time,
+            fill=fill,
+            start_number=start_number,
         )
-        job = job_of(take=kept, timing=said_timing(found, caller))
-        return _solved(job, output, piece, watch, caller)
+        return _solved(job, output, piece=piece, watch=watch)
+
+
+def _check_averaged(results: int) -> None:
+    """Raise UsageError where so many results cannot be averaged."""
+    if not 1 <= results <= MOST_AVERAGED:
+        raise UsageError(f"`denoise` {results}: expected a number from 1 to {MOST_AVERAGED}.")
+
+
+def _said_rig(named: Path | None, clip: Path, caller: Caller) -> Path:
+    """Return the rig that was named, or the one beside the footage, which is said."""
+    path = rig_of_take(named, clip)
+    if named is None:
+        caller.say(f"The lights stand where {path} says.")
+    return path
 
 
 def _delivery(asked: Asked, caller: Caller) -> Delivery:
@@ -235,9 +250,20 @@ def _delivery(asked: Asked, caller: Caller) -> Delivery:
     return delivery
 
 
-def _solved(job: Job, output: Output, piece: str | None, watch: Watch, caller: Caller) -> RunReport:
+def _timed(
+    take: Take, *, output: Output, path: Path | None, first_light: str | None, rig: Rig | None, watch: Watch
+) -> Timing:
+    """Return when flashes fired: by a file; as the pieces of a run that goes on noted it; or found in the picture."""
+    goes_on = output.resume and path is None
+    noted = noted_timing(unfinished_folder_of(output.folder)) if goes_on else None
+    found = noted or read_or_find_timing(take, path, first_light=first_light, rig=rig, watch=watch)
+    return said_timing(found, output.caller)
+
+
+def _solved(job: Job, output: Output, *, piece: str | None, watch: Watch) -> RunReport:
+    """Solve the whole run, or a piece of it, into the output's folder."""
     if piece is not None:
         return piece_run(job, output, piece, watch=watch)
     done = normals_run(job, output, watch=watch)
-    say_kept(job.take.kept, caller)
+    say_kept(job.take.kept, output.caller)
     return done.report

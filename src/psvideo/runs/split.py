@@ -13,7 +13,7 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import USUAL_COMPRESSION, Compression, MovieCodec, PlatesPreview, SplitMethod
 from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.beauty import mix_of
+from psvideo.plates.beauty import Mix, mix_of
 from psvideo.plates.named_timing import read_or_find_timing
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.report.run_report import RunReport
@@ -92,13 +92,12 @@ def split(
     """
     output = Output(folder=path_of("out", out), force=force, resume=resume, start_number=start_number, caller=caller)
     output.check()
-    mix = mix_of(weight or {}, with_ambient=with_ambient)
-    summed = beauty or "beauty" in preview
-    if mix.weights and not summed:
-        raise UsageError("`with_ambient` and `weight`: belong to the beauty plate. Add `beauty`, or leave them out.")
-    previews = tuple(dict.fromkeys(preview))
     extras = Extras(
-        flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec, compression=compression
+        flashes=flashes,
+        mix=_beauty(weight or {}, with_ambient=with_ambient, asked=beauty or "beauty" in preview),
+        previews=tuple(dict.fromkeys(preview)),
+        codec=preview_codec,
+        compression=compression,
     )
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
@@ -126,3 +125,12 @@ def split(
         )
         say_kept(kept.kept, caller)
     return done.report
+
+
+def _beauty(weight: Mapping[str, float], *, with_ambient: bool, asked: bool) -> Mix | None:
+    """Return how lights are mixed in the beauty plate, None where it is not asked for. Raises UsageError where its
+    lights are weighed all the same."""
+    mix = mix_of(weight, with_ambient=with_ambient)
+    if mix.weights and not asked:
+        raise UsageError("`with_ambient` and `weight`: belong to the beauty plate. Add `beauty`, or leave them out.")
+    return mix if asked else None

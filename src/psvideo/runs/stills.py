@@ -1,7 +1,7 @@
 """The whole of ``psvideo stills``: photographs of a still scene, one per light, and no plan."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -29,6 +29,7 @@ from psvideo.runs.photographs.still_rig import KnownLights, listed_lights, spher
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.lighting import AskedLighting, read_lighting
 from psvideo.runs.steps.output import Output
+from psvideo.solve.instants import Instant
 
 STILL_HZ = Fraction(24)
 """What programs take a single picture for; one that stood for the pictures' number would be a rate of nothing."""
@@ -136,26 +137,26 @@ def stills(
     )
     with tempfile.TemporaryDirectory(prefix="psvideo-stills-") as place:
         opened = still_clip(path, pairs, known, looking, Path(place), transfer=transfer, white_level=white_level)
-        take = Take(clip=opened.clip, numbers=opened.clip.numbers)
-        for note in take.clip.notes:
+        for note in opened.clip.notes:
             caller.say(note)
+        take = Take(clip=opened.clip, numbers=opened.clip.numbers)
         lighting = read_lighting(take, opened.rig_path, AskedLighting(mask=pairs.mask))
         lighting.check(delivery)
         delivery = metric_delivery(delivery, aov, lighting, caller)
-        over_time = OverTime(aligning=Aligning(align="none"))
         output = output.given(take, None, solver, fill, delivery, *lighting.identity)
-        with decoded_once(take, output=output.folder) as kept:
-            job = Job(
-                take=kept,
-                timing=read_or_find_timing(kept, None, first_light=None, watch=watch),
-                lighting=lighting,
-                delivery=delivery,
-                solver=solver,
-                fill=fill,
-                over_time=over_time,
-                shown_at_hz=STILL_HZ,
-            )
-            return normals_run(job, output, watch=watch, beside=partial(write_setup, opened, rti=rti)).report
+        how = partial(Job, lighting=lighting, delivery=delivery, solver=solver, fill=fill)
+        return _solved(take, how, output, beside=partial(write_setup, opened, rti=rti), watch=watch)
+
+
+def _solved(
+    take: Take, how: Callable[..., Job], output: Output, *, beside: Callable[[Path, Instant], None], watch: Watch
+) -> RunReport:
+    """Solve photographs as a clip of one round in which nothing moves; ``beside`` writes what else is kept of them."""
+    with decoded_once(take, output=output.folder) as kept:
+        timing = read_or_find_timing(kept, None, first_light=None, watch=watch)
+        at_rest = OverTime(aligning=Aligning(align="none"))
+        job = how(take=kept, timing=timing, over_time=at_rest, shown_at_hz=STILL_HZ)
+        return normals_run(job, output, watch=watch, beside=beside).report
 
 
 def _refuse_words_on_spheres(
@@ -181,6 +182,7 @@ def _known_lights(
     watch: Watch,
     caller: Caller,
 ) -> KnownLights:
+    """Return the lights that a file lists, or that mirror spheres show. Raises UsageError where not one is given."""
     if (lights is None) == (not spheres):
         raise UsageError(
             "`lights` and `sphere`: expected one of the two: a file that says where the lights are, or pictures of a "
