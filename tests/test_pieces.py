@@ -14,8 +14,7 @@ from clips_in_pieces import filmed, judged, same_in_pieces
 import psvideo as ps
 from psvideo.clip import read_frames
 from psvideo.errors import AllDoneError
-from psvideo.plates import gather as gather_module
-from psvideo.plates import spread
+from psvideo.plates import flash_plates, spread
 from psvideo.plates.align import light_history
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
@@ -123,7 +122,7 @@ def test_what_comes_in_late_is_looked_at_too(glossy: Path, monkeypatch: pytest.M
         read.extend(numbers)
         return read_frames(clip, numbers, **options)
 
-    monkeypatch.setattr(gather_module, "read_frames", counted)
+    monkeypatch.setattr(flash_plates, "read_frames", counted)
     some = [*rounds_spread(take, timing, aligning=Aligning())]
     assert [one.number for one in some] == [min(one, max(every) - 1) for one in spread_over([*every])]
     assert some[-1].number >= max(every) - 1

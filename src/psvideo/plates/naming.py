@@ -21,7 +21,7 @@ from psvideo.model.plan import HasLights
 from psvideo.model.rig import Rig
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
-from psvideo.plates.gather import clip_plates
+from psvideo.plates.flash_plates import clip_plates
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.split import Plate
 from psvideo.sync.order_by_rig import RigTurn, named_by_turn, order_by_rig, why_undecided

@@ -20,7 +20,8 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
-from psvideo.plates.gather import first_ambient, gather
+from psvideo.plates.flash_plates import first_ambient
+from psvideo.plates.gather import gather
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.plates.split import Plate

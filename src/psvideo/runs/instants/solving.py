@@ -12,7 +12,8 @@ from psvideo.compute.threads import MOST_WAITING, writing
 from psvideo.export.sequences.result_files import is_written
 from psvideo.model.arrays import Pixels
 from psvideo.plates.ambient.ambient_shown import has_one_dark_slot
-from psvideo.plates.gather import first_ambient, gather
+from psvideo.plates.flash_plates import first_ambient
+from psvideo.plates.gather import gather
 from psvideo.plates.part import Part
 from psvideo.plates.spread import rounds_spread
 from psvideo.report.observe.observed import Observed
