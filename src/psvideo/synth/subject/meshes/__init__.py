@@ -1,7 +1,7 @@
 """The built-in meshes, made by formulas when they are asked for: nothing is stored, nothing is downloaded.
 
 Every mesh is in metres at a natural size, y up, facing +z. ``basic`` has plain bodies, ``still_life`` and ``fan`` have
-things; ``head`` is sculpted with ``fields`` and made a mesh by ``surface_nets``.
+things; ``head`` and its ``face`` are sculpted with ``fields`` and made a mesh by ``surface_nets``.
 """
 
 import dataclasses
