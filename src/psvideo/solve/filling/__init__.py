@@ -2,6 +2,6 @@
 
 ``filled`` does it; ``leaving_out`` says where a solved pixel has light that no lamp sent it. ``tiles`` cuts out what
 lies around holes. ``growing`` starts at solved pixels and goes inwards, the nearest first (``bucket_queue``).
-``neighbours`` suggest a pixel's normal, ``looking`` says which lights reach it, ``hernandez2011`` combines both: two
-lights, or one, and the neighbours.
+``neighbours`` suggest a pixel's normal, continued as they bend (``neighbours_bend``), ``looking`` says which lights
+reach it, ``hernandez2011`` combines both: two lights, or one, and the neighbours.
 """

@@ -5,6 +5,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded
 from psvideo.solve.filling.looking import Said
+from psvideo.solve.filling.neighbours_bend import Sums, bend_of, level_across
 from psvideo.solve.filling.tiles import ODD_AT_RIM, WITHIN, Tiles, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
@@ -15,8 +16,6 @@ SAME_LIGHT = np.float32(0.2)  # what would show a light that differs by this sha
 LEAST_SHARE = np.float32(1e-3)  # and nothing less than this;
 WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0, 1.0, 0.1], np.float32)  # of states: no, one, two lights, solved
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
-LEAST_SPREAD = np.float32(0.1)  # of neighbours' places, a variance: fewer do not show a bend
-LEAST_AWAY_PX, LEAST_FACING = np.float32(0.3), np.float32(0.15)
 THIRD, TINY = np.float32(1 / 3), np.float32(1e-6)
 WINDOW = np.exp(
     -(np.arange(-REACH_PX, REACH_PX + 1)[:, None] ** 2 + np.arange(-REACH_PX, REACH_PX + 1)[None] ** 2)
@@ -70,45 +69,9 @@ def misfit(s: Said, pixel: int, x: np.float32, y: np.float32, z: np.float32) -> 
 
 
 @FUSED.inlined
-def _level_across(
-    down: np.float32, right: np.float32, vy: np.float32, vx: np.float32, vxy: np.float32,
-    nx: np.float32, ny: np.float32, nz: np.float32,
-    x_row: np.float32, y_row: np.float32, z_row: np.float32, x_col: np.float32, y_col: np.float32, z_col: np.float32,
-) -> tuple[np.float32, np.float32, np.float32]:  # fmt: skip
-    """The vector that lies in the surface across the way from the neighbours to the pixel, whose mean place is
-    (down, right) of it, with (co)variances (vy, vx, vxy), from their mean normal and what it changes by for each row
-    and column; 0 where they lie all around."""
-    away = np.sqrt(down * down + right * right)
-    if not away > LEAST_AWAY_PX:
-        return ZERO, ZERO, ZERO
-    # slopes, -x / z for each column (p) and y / z for each row (q), and what they change by
-    z = max(nz, LEAST_FACING)
-    slope_p, slope_q, one = -nx / z, ny / z, ONE / z
-    p_row, p_col = (-x_row - slope_p * z_row) * one, (-x_col - slope_p * z_col) * one
-    q_row, q_col = (y_row - slope_q * z_row) * one, (y_col - slope_q * z_col) * one
-    # along the way u that growth goes, and across it
-    u_row, u_col = -down / away, -right / away
-    across = slope_q * u_col - slope_p * u_row
-    one_way = (q_col * u_col + q_row * u_row) * u_col - (p_col * u_col + p_row * u_row) * u_row
-    other_way = (p_row * u_col - p_col * u_row) * u_col + (q_row * u_col - q_col * u_row) * u_row
-    along_spread = vy * u_row * u_row + vx * u_col * u_col + np.float32(2) * vxy * u_row * u_col
-    across_spread = vy * u_col * u_col + vx * u_row * u_row - np.float32(2) * vxy * u_row * u_col
-    across += away * (one_way * along_spread + other_way * across_spread) / (along_spread + across_spread)
-    one = ONE / np.sqrt(ONE + across * across)
-    return -u_row * one, -u_col * one, across * one
-
-
-@FUSED.inlined
-def from_neighbours(
-    p: Tiles, s: Said, row: int, col: int, onward: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those most that have
-    its colour and explain its light; so much of their bend is taken ``onward``, so that a round surface stays round.
-
-    At last a vector that lies in the surface, across the way from the neighbours to the pixel; 0 where they lie all
-    around. How steep a surface is across that way changes along it as its steepness along it changes across it, since
-    slopes are those of one depth: so that is known where nothing else of the next normal is.
-    """
+def _summed(p: Tiles, s: Said, row: int, col: int) -> Sums:
+    """Sums over the neighbours that are known, by how near they are, how like in colour, and how well they explain the
+    pixel's light."""
     channels = p.albedo.shape[1]
     red, blue, noise = colour_of(p, s, row, col)
     weight = albedo = nx = ny = nz = reds = blues = ZERO
@@ -151,26 +114,33 @@ def from_neighbours(
             downs, rights, both = downs + wy * dy, rights + wx * dx, both + wy * dx
             nx_down, ny_down, nz_down = nx_down + wy * a, ny_down + wy * b, nz_down + wy * c
             nx_right, ny_right, nz_right = nx_right + wx * a, ny_right + wx * b, nz_right + wx * c
-    if not weight > ZERO:
-        return ZERO, ZERO, ONE, ZERO, THIRD, THIRD, ZERO, ZERO, ZERO
-    one = ONE / weight
-    albedo, reds, blues = albedo * one, reds * one, blues * one
-    nx, ny, nz, down, right = nx * one, ny * one, nz * one, down * one, right * one
-    vy, vx = downs * one - down * down + LEAST_SPREAD, rights * one - right * right + LEAST_SPREAD
-    vxy = both * one - down * right
-    determinant = ONE / (vy * vx - vxy * vxy)
-    # the straight course of the neighbours' normals: what they change by for each row and column
-    ax, ay, az = nx_down * one - down * nx, ny_down * one - down * ny, nz_down * one - down * nz
-    bx, by, bz = nx_right * one - right * nx, ny_right * one - right * ny, nz_right * one - right * nz
-    x_row, x_col = (ax * vx - bx * vxy) * determinant, (bx * vy - ax * vxy) * determinant
-    y_row, y_col = (ay * vx - by * vxy) * determinant, (by * vy - ay * vxy) * determinant
-    z_row, z_col = (az * vx - bz * vxy) * determinant, (bz * vy - az * vxy) * determinant
-    tx, ty, tz = _level_across(
-        down, right, vy, vx, vxy, nx, ny, nz, x_row, y_row, z_row, x_col, y_col, z_col
+    return Sums(
+        weight, albedo, reds, blues, nx, ny, nz, down, right, downs, rights, both, nx_down, ny_down, nz_down, nx_right,
+        ny_right, nz_right,
     )  # fmt: skip
-    nx -= onward * (down * x_row + right * x_col)
-    ny -= onward * (down * y_row + right * y_col)
-    nz -= onward * (down * z_row + right * z_col)
+
+
+@FUSED.inlined
+def from_neighbours(
+    p: Tiles, s: Said, row: int, col: int, onward: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those most that have
+    its colour and explain its light; so much of their bend is taken ``onward``, so that a round surface stays round.
+
+    At last a vector that lies in the surface, across the way from the neighbours to the pixel; 0 where they lie all
+    around. How steep a surface is across that way changes along it as its steepness along it changes across it, since
+    slopes are those of one depth: so that is known where nothing else of the next normal is.
+    """
+    sums = _summed(p, s, row, col)
+    if not sums.weight > ZERO:
+        return ZERO, ZERO, ONE, ZERO, THIRD, THIRD, ZERO, ZERO, ZERO
+    one = ONE / sums.weight
+    albedo, reds, blues = sums.albedo * one, sums.reds * one, sums.blues * one
+    c = bend_of(sums, one)
+    tx, ty, tz = level_across(c)
+    nx = c.nx - onward * (c.down * c.x_row + c.right * c.x_col)
+    ny = c.ny - onward * (c.down * c.y_row + c.right * c.y_col)
+    nz = c.nz - onward * (c.down * c.z_row + c.right * c.z_col)
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
     one = ONE / max(length, TINY)
     return nx * one, ny * one, nz * one, albedo, reds, blues, tx, ty, tz
