@@ -135,6 +135,22 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
     assert few_checked.model_turns_deg(flat, 0.5 * truth).max() < 1
 
 
+@pytest.mark.parametrize(
+    ("soft", "others", "least", "most"),
+    [
+        ((0.27, 0.84), (0.64, 0.87), 0.0, 0.0),  # a glossy bust that turns, in one round of six
+        ((0.25, 0.86), (0.14, 0.82), 0.0, 0.0),  # another round
+        ((0.10, 0.20), (0.50, 0.60), 1.0, 1.0),  # wax
+        ((0.40, 0.60), (0.65, 0.70), 0.1, 0.9),
+    ],
+)
+def test_softness_leaves_less_by_its_own_weights_and_evenly(
+    soft: tuple[float, float], others: tuple[float, float], least: float, most: float
+) -> None:
+    held = few_checked.much_less_left(few_checked.LeftOver(*soft), few_checked.LeftOver(*others))
+    assert least <= held <= most
+
+
 def test_angles_around_are_means_of_a_gaussian() -> None:
     rng, shape = np.random.default_rng(8), (60, 80)
     rows, cols = rng.integers(0, 60, 300), rng.integers(0, 80, 300)

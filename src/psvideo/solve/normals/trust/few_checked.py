@@ -5,7 +5,7 @@ much the model that fits all of the subject would turn them says how far they ma
 """
 
 from dataclasses import replace
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import cv2
 import numpy as np
@@ -35,12 +35,23 @@ LEAST_EVENLY = 0.05
 up to 0.9 of what its weights leave; of what shines a little 0.1, and much 0.5 to 0.9."""
 ENOUGH_LESS = 0.3
 """Where softness leaves MUCH_LESS_LEFT over 1 and this of what others leave, it counts wholly."""
+LESS_EVENLY, CLEARLY_EVENLY = 0.96, 0.06
+"""So much less than the others must softness leave where all measurements count alike, and counts wholly over 1 and the
+second of it: what fits by the weights of one fit alone is a sheen on a subject that moves."""
 TURNS = 2
 """How often model and normals follow each other: four times cost twice as much and say the same."""
 AROUND = 0.07
 """Angles are means around a point, Gaussian of this standard deviation, as a share of the subject's size."""
 FAR = 1e-3
 """Where points are farther than that, the mean of all of them counts, as this much of one."""
+
+
+class LeftOver(NamedTuple):
+    """Which share of the squares a model leaves, ``weighted`` as its fit weighs them, and ``evenly`` where all count
+    alike."""
+
+    weighted: float
+    evenly: float
 
 
 def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) -> Floats | None:
@@ -75,19 +86,34 @@ def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
     """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3): one
     that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts nothing, one
     that explains twice as much wholly: what comes and goes by its noise would flicker."""
-    sizes, most, left = np.linalg.norm(g, axis=1), np.zeros(len(g)), 1.0
+    sizes, most, others = np.linalg.norm(g, axis=1), np.zeros(len(g)), LeftOver(1.0, 1.0)
     typical = median(sizes)
     for kind in get_args(Kind):
         one = alternated(points, g, typical, Sought(kind), turns=TURNS, least=LEAST_EXPLAINED)
-        holds = _beyond(explained_evenly(points, g, typical, one.model), LEAST_EVENLY)
+        evenly = explained_evenly(points, g, typical, one.model)
+        left = LeftOver(1 - one.explained, 1 - evenly)
+        holds = _beyond(evenly, LEAST_EVENLY)
         holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if kind == "rough" else 1.0
         if kind == "soft":  # the last: it must leave much less than the others, or lights that are off look like it
-            holds *= _beyond(float(one.model[SOFT]), LEAST_SOFT)
-            holds *= min(_beyond(MUCH_LESS_LEFT * left / max(1 - one.explained, 1e-9), 1.0) / ENOUGH_LESS, 1.0)
-        left = min(left, 1 - one.explained)
+            holds *= _beyond(float(one.model[SOFT]), LEAST_SOFT) * much_less_left(left, others)
+        others = LeftOver(min(left.weighted, others.weighted), min(left.evenly, others.evenly))
         cosines = (one.g * g).sum(axis=1) / np.maximum(np.linalg.norm(one.g, axis=1) * sizes, 1e-12)
         most = np.maximum(most, holds * np.degrees(np.arccos(np.clip(cosines, -1, 1))))
     return most
+
+
+def much_less_left(soft: LeftOver, others: LeftOver) -> float:
+    """Return how surely softness leaves less than the best of the other kinds, 0 to 1: much less by its weights, and
+    less where all measurements count alike.
+
+    >>> much_less_left(LeftOver(0.27, 0.84), LeftOver(0.64, 0.87))
+    0.0
+    >>> much_less_left(LeftOver(0.1, 0.2), LeftOver(0.5, 0.6))
+    1.0
+    """
+    weighted = _beyond(MUCH_LESS_LEFT * others.weighted / max(soft.weighted, 1e-9), 1.0) / ENOUGH_LESS
+    evenly = _beyond(LESS_EVENLY * others.evenly / max(soft.evenly, 1e-9), 1.0) / CLEARLY_EVENLY
+    return min(weighted, 1.0) * min(evenly, 1.0)
 
 
 def _beyond(value: float, least: float) -> float:
