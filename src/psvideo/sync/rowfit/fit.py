@@ -82,21 +82,11 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
     window = window_frames(plan)
     course = followed(plan, rows.binned(TRACK_ROWS), seed)
     tracked = course.track
-    keep = ~tracked.repeated
-    fine = replace(
-        rows,
-        value=np.ascontiguousarray(rows.value[keep]),
-        index=tracked.index[keep],
-        doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
-    ).windowed(window)
+    fine = _tracked_rows(rows, tracked).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
     best, reading = _rightly_read(plan, stretches(fine), tracked.beat, free)
     fine = reading.of(fine) if reading else fine
-    if len(best.rows.value) == len(fine.value):
-        plain, as_seen = _as_seen(plan, best.rows, best.fit)
-    else:
-        whole_take = straight(fine, best.curves)
-        plain, as_seen = throughout(plan, whole_take, best.rows, best.fit, tracked.beat, follow=best.slack_s == 0.0)
+    plain, as_seen = _of_whole_take(plan, fine, best, tracked.beat)
     stray = jitter(plan, plain, as_seen) if best.slack_s == 0.0 else STEADY
     loose_s = unsteady_s(plan, plain, as_seen, stray)
     return ClipFit(
@@ -117,6 +107,25 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         regular=regular_step(tracked.index, rows.index) != 1,
         reading=reading,
     )
+
+
+def _tracked_rows(rows: Profiles, track: FrameTrack) -> Profiles:
+    """Return the frames that are no repeats, at the places in time where they were tracked."""
+    keep = ~track.repeated
+    return replace(
+        rows,
+        value=np.ascontiguousarray(rows.value[keep]),
+        index=track.index[keep],
+        doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
+    )
+
+
+def _of_whole_take(plan: Plan, fine: Profiles, best: BestFit, start: Beat) -> tuple[Profiles, Fit]:
+    """Return all rows of a take and their fit, where ``best`` was fitted to all of them or to some stretches."""
+    if len(best.rows.value) == len(fine.value):
+        return _as_seen(plan, best.rows, best.fit)
+    whole_take = straight(fine, best.curves)
+    return throughout(plan, whole_take, best.rows, best.fit, start, follow=best.slack_s == 0.0)
 
 
 def _rightly_read(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> tuple[BestFit, OtherCurve | None]:
