@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from psvideo.clip.decode.decoders import opened
-from psvideo.clip.decoded import CodedPicture, PictureInFile
+from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.folder import KINDS, number_of
 from psvideo.clip.linear import in_codes
@@ -70,15 +70,8 @@ def read_growing(
                 done = number
                 continue
             damaged.clear()
-            head = picture.header
-            if (head.width_px, head.height_px) != (camera.width_px, camera.height_px) or look not in ("", looks(head)):
-                expected = look or f"{camera.width_px} x {camera.height_px} pixels"
-                raise PsvideoError(
-                    f"{file}: is {looks(head)}; expected {expected}, as the plan and the frames before say. Use the "
-                    "plan of this mode, and an empty folder for each take."
-                )
-            check_live_filters(file, head, camera.encoding.cfa)
-            first, look, done = number if first is None else first, looks(head), number
+            _check_alike(file, picture.header, camera, look)
+            first, look, done = number if first is None else first, looks(picture.header), number
             yield Frame(index=number - first, number=number, coded=in_codes(picture, camera.encoding))
         if done > before:
             seen_s = {number: at_s for number, at_s in seen_s.items() if number > done}
@@ -92,6 +85,17 @@ def read_growing(
             f"{folder}: no frame appeared in {quiet_s:g} s; expected numbered images ({', '.join(sorted(KINDS)[:6])}, "
             "…). Start the recorder, then psvideo live again."
         )
+
+
+def _check_alike(file: Path, head: Header, camera: Camera, look: str) -> None:
+    """Raise PsvideoError where a frame is not as the camera's, or does not look as those before (``look``)."""
+    if (head.width_px, head.height_px) != (camera.width_px, camera.height_px) or look not in ("", looks(head)):
+        expected = look or f"{camera.width_px} x {camera.height_px} pixels"
+        raise PsvideoError(
+            f"{file}: is {looks(head)}; expected {expected}, as the plan and the frames before say. Use the "
+            "plan of this mode, and an empty folder for each take."
+        )
+    check_live_filters(file, head, camera.encoding.cfa)
 
 
 def _new_files(folder: Path, after: int, passed: dict[Path, set[str]]) -> list[tuple[int, Path]]:

@@ -64,9 +64,11 @@ by 3 to 10 degrees where the other does not. Softness has to explain more than e
 
 
 def fitted(points: SubjectPoints) -> Reflectance | None:
-    """Return the model that explains the points best, solved with their normals in turn; of fewer lights than FOR_SHINE
-    only a rough or soft one that plainly does. What is soft is looked for among the points that fit worst, too: before
-    a wall that fits most points are the wall's, and what the others leave counts as outliers."""
+    """Return the model that explains the points best, fitted with their normals in turn; None where none does.
+
+    Under fewer lights than FOR_SHINE only rough and soft ones are looked for. What is soft is looked for among the
+    points that fit worst, too: where most points are of a wall that fits, what a soft thing leaves counts as outliers.
+    """
     found = _of_all(points)
     part = None if len(points.measured) < FOR_SHINE else _of_all(_worst_fitting(points))
     least_soft = 0.0 if found is None else SOFTER * found.soft
@@ -124,6 +126,7 @@ def off_a_ring(directions: Doubles) -> float:
 
 
 def _to_try(points: SubjectPoints) -> tuple[Literal["rough", "soft"], ...]:
+    """Return the kinds of model that the lights can show."""
     spread = np.linalg.svd(points.towards.mean(axis=1), compute_uv=False)
     return ("rough", "soft") if spread[0] < WELL_SPREAD * spread[-1] else ("soft",)
 

@@ -38,8 +38,8 @@ OUTLYING = 3.0
 
 
 class InPlace(NamedTuple):
-    """What stands in softness' place: a lobe h^``power`` in shares of the albedo (``on_paint``) or whatever the albedo,
-    or, of power 0, softness itself."""
+    """What is fitted in softness' place, to see whether it explains as much: a lobe h^``power``, as a share of the
+    albedo (``on_paint``) or the same on every paint. Power 0 is softness itself."""
 
     power: float = 0.0
     on_paint: bool = False
@@ -64,8 +64,11 @@ def alternated(
     points: SubjectPoints, g: Doubles, typical: float, sought: Sought = Sought(), *,
     turns: int = ALTERNATIONS, least: float = -np.inf,
 ) -> ModelFollowed:  # fmt: skip
-    """Return the model and what it explains, from normals that follow it; nothing where that is hopeless, or no more
-    than the ``least``."""
+    """Return the model that is fitted in turn with the points' normals, beginning with ``g`` (point, 3), these times
+    albedo; ``typical`` is the subject's albedo.
+
+    An empty model, with the normals as they came, where it is none of its kind or explains no more than ``least``.
+    """
     points, nothing = points.in_order(), ModelFollowed(np.zeros(NUMBERS), 0.0, g)
     model, explained = np.zeros(NUMBERS), 0.0
     for turn in range(turns):

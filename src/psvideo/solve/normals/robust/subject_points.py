@@ -8,14 +8,19 @@ import numpy as np
 from psvideo.model.arrays import Doubles, Mask
 
 LEAST_POINTS = 50
+"""To fewer no model is fitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SubjectPoints:
-    """Points of the subject: measurements (light, point) in units of every light's strength, which of them count
-    (0 or 1), and which are seen and not clipped, dark or not; directions to the lights (light, point, 3), and half way
-    from there to the camera; ``to_camera`` (point, 3); and ``normals`` (point, 3) as the points were solved without a
-    model."""
+    """Points of a subject under some lights.
+
+    - ``measured`` (light, point): brightness in units of every light's strength; ``counts``: 1 where that counts, else
+      0; ``seen``: 1 where it is seen and not clipped, dark or not
+    - ``towards`` (light, point, 3): unit vectors to the lights; ``half``: those half way from there to the camera
+    - ``to_camera`` (point, 3): unit vectors to the camera
+    - ``normals`` (point, 3): as the points were solved without a model
+    """
 
     measured: Doubles
     counts: Doubles

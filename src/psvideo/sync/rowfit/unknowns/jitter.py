@@ -20,12 +20,14 @@ from psvideo.sync.rowfit.row_model import Flashes, places
 from psvideo.sync.rowfit.unknowns.edge_pulls import moved_flashes, pulls
 
 LEAST_FLASHES = 8
+"""Of fewer flashes nothing is said."""
 SURE = 5.0
 """Standard deviations of Fisher's z (1921) by which openings and closings must agree before flashes are moved."""
 FEW, LIKELY = 0.5, 2.5
 """Where so small a share of the flashes has both, as below 360 degrees, these few need agree by this much only, if even
 and odd rows agree as well."""
 ALIKE = 1 - 1e-9
+"""A likeness of 1 would be infinitely sure."""
 ROUNDS = 4
 """Flashes are moved, and looked at again where they then are: brightnesses had taken up some of what they strayed."""
 ENOUGH = 0.1
