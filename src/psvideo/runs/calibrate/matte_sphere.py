@@ -1,6 +1,6 @@
 """The whole of ``psvideo calibrate matte-sphere``: pictures of a matte sphere in, a rig file and a picture out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,22 +100,28 @@ def matte_sphere(
     write_text(rig_path, format_rig(rig))
     if doubt:
         caller.warn(f"{pictures}: {doubt}")
+    for caution in _cautions(lights, lens_known=focal_px is not None):
+        caller.warn(caution)
+    return MatteCalibration(outline=outline, lights=tuple(lights), rig=rig, picture=picture)
+
+
+def _cautions(lights: Sequence[MatteLight], *, lens_known: bool) -> Iterator[str]:
+    """Yield what the lights' directions are to be distrusted for: lights left out, other light, no focal length."""
     for light in lights:
         if light.fault:
-            caller.warn(f"light {light.name!r} is left out of the rig: {light.fault}")
+            yield f"light {light.name!r} is left out of the rig: {light.fault}"
     flatter_deg = median(np.array([light.flatter_deg for light in lights if not light.fault]))
     if flatter_deg > FLATTER_DEG:
-        caller.warn(
+        yield (
             f"the sphere fades less towards its shadow than a matte one does under one lamp, which may turn directions "
             f"by about {flatter_deg:.0f} degrees: light in the room that was not taken off (a picture with all lamps "
             "off, named ambient, does it), pictures under another curve than `transfer` says, or rough paint"
         )
-    if focal_px is None:
-        caller.warn(
+    if not lens_known:
+        yield (
             "the focal length is not known, so the view is assumed orthographic, and all directions are wrong by "
             "about the angle by which the sphere stands off the lens's axis: give `focal_px`"
         )
-    return MatteCalibration(outline=outline, lights=tuple(lights), rig=rig, picture=picture)
 
 
 def _few(lights: Sequence[MatteLight], doubt: str) -> str:
