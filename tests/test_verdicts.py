@@ -81,10 +81,11 @@ def steadiness(one: Observed) -> list[Judgement]:
 
 
 SOLVED = [
-    _by("rig", rig_but_leaning, "rig", {"claimed_deg": 15}, {"claimed_deg": 26}, shape="waves", lights=8),
+    _by("rig", rig_but_leaning, "rig", {"claimed_deg": 15}, {"claimed_deg": 26}, "nothing doubtful", shape="waves",
+        lights=8),
     _by("rig lost", rig_but_leaning, "rig", {"claimed_deg": 26}, {"claimed_deg": 40}, "doubtful bad", shape="waves",
         lights=8),
-    _by("strength", rig_of, "rig", {"claimed_gain": 1.15}, {"claimed_gain": 1.4}, shape="waves"),
+    _by("strength", rig_of, "rig", {"claimed_gain": 1.15}, {"claimed_gain": 1.4}, "nothing doubtful", shape="waves"),
     _by("turned", rig_but_leaning, "rig", {"turned_deg": 24}, {"turned_deg": 27}, "nothing doubtful", shape="waves",
         lights=3),
     _by("turned around", rig_but_leaning, "rig", {"turned_deg": 31}, {"turned_deg": 35}, "doubtful bad", shape="waves",

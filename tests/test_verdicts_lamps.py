@@ -70,7 +70,7 @@ def test_of_many_lights_those_that_are_off_are_all_named_and_to_be_mended_one_by
     """A bear's strengths were to be measured on the bear: its normals got worse. Most of 18 names were left out."""
     off = (1, 3, 4, 6, 7)[: count // 2 - 1]
     found = RigFit(
-        misfit=0.3, own_misfit=0.02, scaled_misfit=0.03,
+        misfit=0.3, own_misfit=0.02, typical_own=0.02, scaled_misfit=0.03,
         strengths=tuple(1.5 if light in off else 1.0 for light in range(count)),
     )  # fmt: skip
     line = rig_misfits([f"light{number}" for number in range(count)], found)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from psvideo.report.judge.of_strengths import other_strengths
+from psvideo.report.judge.rig_by_plates import OF_FOUR, OF_MORE
 from psvideo.report.judge.typical_error import (
     COMMON_DEG,
     LOST_DEG,
@@ -18,11 +19,10 @@ from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 
-NOT_MATTE = 0.1
-"""From this share of the light on that another rig would explain and this one cannot, directions are doubted."""
 MOSTLY = 0.7
-"""Or from this share of what is left over on: of matte subjects a rig that is off leaves little else (0.9 of it, one of
-five lights 5 degrees off; 0 under haze and of gloss, which no rig explains)."""
+"""From OF_MORE of the light on that another rig would explain and this one cannot, directions are doubted; or from this
+share of what is left over on: of matte subjects a rig that is off leaves little else (0.9 of it, one of five lights 5
+degrees off; 0 under haze and of gloss, which no rig explains)."""
 UNKNOWN_DISTANCE = 0.1
 """From this share of the subject on, what is not known of near lights' distance is said: it costs as many normals."""
 MOVING_FACTOR = 2.0
@@ -80,9 +80,16 @@ def off_by_albedo(observed: Observed) -> Judgement | None:
     return Judgement(
         subject="accuracy",
         grade="bad" if slope_deg > LOST_DEG else "doubtful",
-        found=f"A typical normal is off by about {slope_deg:.0f} degrees: albedo {GOES_WITH_SLOPE}.",
+        found=f"A typical normal is off by about {slope_deg:.0f} degrees: albedo {GOES_WITH_SLOPE}"
+        f"{_or_directions(observed)}.",
         advice=f'{BESIDE_THE_OTHERS}; normals with `aov=["error"]` say how far off each pixel may be.',
     )
+
+
+def _or_directions(observed: Observed) -> str:
+    fit = observed.rig_fit
+    doubted = fit is not None and fit.by_rig > OF_FOUR
+    return "; or directions of the lights are off, which would explain what is left over" if doubted else ""
 
 
 def _why_off(observed: Observed) -> tuple[str, str]:
@@ -94,7 +101,7 @@ def _why_off(observed: Observed) -> tuple[str, str]:
         return "two lights are exchanged", "See the line on the rig"
     if fit is not None and other_strengths(observed.firing_lights, fit):
         return "some lights are not as strong as the rig says", "See the line on the rig"
-    if fit is not None and fit.excess > min(NOT_MATTE, MOSTLY * fit.misfit):
+    if fit is not None and fit.by_rig > min(OF_MORE, MOSTLY * fit.misfit):
         return (
             "other directions of the lights would explain more: they are a few degrees off, or the surface is glossy",
             "Measure the lights on a sphere beside the subject",

@@ -3,6 +3,7 @@
 import numpy as np
 
 from psvideo.report.judge.of_exposure import LOST_CLIPPED
+from psvideo.report.judge.rig_by_plates import surface_leaves
 from psvideo.report.judge.typical_error import AT_REST, LOST_DEG, moves, off_deg, quiet
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
@@ -27,9 +28,21 @@ removes."""
 MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
 rig as well, on photographs by 9 to 15 degrees."""
+BY_GLOSS = 1.5
+"""What shines, or lets light through, leans normals under a right rig as well, at gains up to this: busts and vases of
+satin, wax and lustre under three lights 0.02 to 1.25; matte ones under lights that are 10 to 20 degrees off 1.4 to
+25."""
+OR_GLOSS = (
+    " Or the surface shines or lets light through (satin, varnish, skin, wax): these lights do not tell gloss from a "
+    "wrong rig."
+)
 FLAT = (
     "The normals are not quite those of one surface, and would be if all leaned otherwise: the lights lie nearly in a "
     "plane, so that gloss, light from around or a rig that is a little off turn all of them."
+)
+IF_IT_SHINES = (
+    "If the subject is matte, measure the lights again with the camera where it stands. If it shines, use six lights "
+    "and more, well spread, or polarising filters."
 )
 OR_STRENGTHS = " Under three lights other strengths than the rig's, or two lights exchanged, may do the same."
 TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
@@ -45,11 +58,15 @@ def normals_lean(observed: Observed) -> Judgement | None:
     clearly = BY_LEANING if quiet(observed.facts, change_deg=STEADY_DEG, noise_deg=QUIET_DEG) else SURELY_LEANING
     if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= clearly:
         return None
+    gloss = _may_be_gloss(observed, usual)
     if usual.off_axis is not None and (usual.least_deg or 0.0) < REST * usual.lean_deg:
-        return _off_axis(usual, usual.off_axis)
+        return _off_axis(usual, usual.off_axis, gloss=gloss)
     whole = usual.rest_deg < REST * usual.lean_deg
     flat = _nearly_in_a_plane(observed)
     exact = int(observed.firing.sum()) == EXACT_LIGHTS
+    if gloss and not flat:
+        found = f"{_leaning_words(usual, whole=whole, exact=exact)}{OR_GLOSS}"
+        return Judgement(subject="rig", grade="doubtful", found=found, advice=IF_IT_SHINES)
     return Judgement(
         subject="rig",
         grade="bad" if (whole or exact) and not flat and _lost(usual, shown_deg) else "doubtful",
@@ -62,14 +79,27 @@ def normals_lean(observed: Observed) -> Judgement | None:
     )
 
 
-def _off_axis(usual: Lean, widths: float) -> Judgement:
-    """Say that a lens that is not known may be why: of a right rig as well, so the rig itself is not doubted."""
+def _may_be_gloss(observed: Observed, usual: Lean) -> bool:
+    """Return whether the surface may make normals lean as far: three lights show nothing of it, more what no rig
+    explains."""
+    if usual.gain >= BY_GLOSS:
+        return False
+    fit = observed.rig_fit
+    if fit is None:
+        return int(observed.firing.sum()) == EXACT_LIGHTS
+    return surface_leaves(fit)
+
+
+def _off_axis(usual: Lean, widths: float, *, gloss: bool) -> Judgement:
+    """Say that a lens that is not known may be why: of a right rig as well, so the rig itself is not doubted.
+    ``gloss``: the surface may be why, too."""
     return Judgement(
         subject="lens",
         grade="doubtful",
         found="The normals would be those of one surface if the lens's axis met the picture "
         f"{100 * widths:.0f} % of its width off the middle (cropped, or a shifted lens), or if the rig were tilted by "
-        f"about {usual.lean_deg:.0f} degrees: without a lens in the rig nothing tells which.",
+        f"about {usual.lean_deg:.0f} degrees: without a lens in the rig nothing tells which."
+        + (" A surface that shines or lets light through does the same." if gloss else ""),
         advice="Write focal_px and principal_px into the rig's [camera]; if the axis is in the middle, measure the "
         "lights again with the camera where it stands.",
     )

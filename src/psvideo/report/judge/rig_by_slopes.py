@@ -4,6 +4,7 @@ import numpy as np
 
 from psvideo.report.judge.rig_by_facing import as_it_is_seen, faces_outwards
 from psvideo.report.judge.rig_by_lean import EXACT_LIGHTS, LEANS_DEG
+from psvideo.report.judge.rig_by_plates import surface_leaves
 from psvideo.report.judge.typical_error import distance_unknown_share, moves, quiet
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import Observed
@@ -17,6 +18,7 @@ AGREE, DISAGREE = 0.3, -0.1
 ELSEWHERE = 0.5
 """Where near lights' distance is not known in more of the subject than this, normals are first turned by that: under a
 right rig, slopes of a ball before a wall agreed by 0.03 to 0.09 under 5 and 8 lights at half to one of its widths."""
+OR_SHINES = "much of the surface shines, for no other rig would explain what is left over, or "
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
@@ -55,11 +57,14 @@ def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
             "lights as the plan does. If it does, add lights.",
         )
     elsewhere = distance_unknown_share(observed) > ELSEWHERE
+    fit = observed.rig_fit
+    gloss = agreement > DISAGREE and fit is not None and surface_leaves(fit)
     of_distance = "most of it may be nearer or farther away than assumed (see the line on distance), or "
     return Judgement(
         subject="rig",
         grade="doubtful" if elsewhere else grade,
-        found=f"{cannot}: {of_distance if elsewhere else ''}directions are mirrored or turned, or lights exchanged."
+        found=f"{cannot}: {of_distance if elsewhere else ''}{OR_SHINES if gloss else ''}directions are mirrored or "
+        "turned, or lights exchanged."
         f"{as_it_is_seen(observed)}",
         advice=("If the line stays once the distance is known, check" if elsewhere else "Check") + " that the rig file "
         "is in camera axes (x right, y up), belongs to this set-up, and names the lights as the plan does; calibrate "

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Doubles
+from psvideo.report.observe.rig_and_curve.any_rig import left_by_any_rig
 from psvideo.report.observe.rig_and_curve.exchanged import exchanged
 from psvideo.report.observe.rig_and_curve.lamp_strengths import LampStrengths, lamp_strengths, reaches
 from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
@@ -24,8 +25,9 @@ LEAST_LIGHT = 4.0
 @dataclass(frozen=True, kw_only=True)
 class RigFit:
     """What a few thousand points said of the rig. ``misfit`` is the median share of a point's light that no normal
-    explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``scaled_misfit`` what
-    is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
+    explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``typical_own`` that
+    of a usual point, which highlights and shadows do not reach. ``scaled_misfit`` is what is left once every light's
+    strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
     ``near`` is how near lamps stand that the rig takes for distant, ``curves`` what is left over under other transfer
     curves; both None where it says where they stand. ``lamps`` are strengths that shadows and highlights change little;
     None where lights are too few for that. ``exchanged`` are two lights, by their place, that are taken for each
@@ -33,6 +35,7 @@ class RigFit:
 
     misfit: float
     own_misfit: float
+    typical_own: float
     scaled_misfit: float
     strengths: tuple[float, ...]
     near: Nearness | None = None
@@ -44,6 +47,12 @@ class RigFit:
     def excess(self) -> float:
         """The share of the light that another rig could explain, and this one cannot."""
         return float(np.sqrt(max(self.misfit**2 - self.own_misfit**2, 0.0)))
+
+    @property
+    def by_rig(self) -> float:
+        """The share of a usual point's light that another rig could explain, and this one cannot: few highlights and
+        shadows do not hide it."""
+        return float(np.sqrt(max(self.misfit**2 - self.typical_own**2, 0.0)))
 
 
 def rig_fit(
@@ -60,7 +69,8 @@ def rig_fit(
     if count < 4 or reached.sum() < LEAST_POINTS:
         return None
     unit = light[reached] / np.linalg.norm(light[reached], axis=1, keepdims=True)
-    beyond = _beyond(vectors if len(vectors) == 1 else vectors[reached])
+    sent = vectors if len(vectors) == 1 else vectors[reached]
+    beyond = _beyond(sent)
     left = np.einsum("...ij,...j->...i", beyond, unit)
     misfit = float(np.median(np.linalg.norm(left, axis=1)))
     moments = unit.T @ unit
@@ -79,7 +89,9 @@ def rig_fit(
         pair = exchanged(moments, beyond[0])
     scaled = float(np.sqrt(max(share, 0)))
     return RigFit(
-        misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves,
+        misfit=misfit, own_misfit=own,
+        typical_own=left_by_any_rig(left, np.einsum("...ij,...j->...i", np.linalg.pinv(sent), unit)),
+        scaled_misfit=scaled, strengths=strengths, near=near, curves=curves,
         exchanged=pair,
         lamps=lamp_strengths(light[lit], vectors if len(vectors) == 1 else vectors[lit], white=white[lit]),
     )  # fmt: skip
