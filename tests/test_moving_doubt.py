@@ -13,13 +13,12 @@ from psvideo.solve.normals.trust.indirect import not_of_motion
 from psvideo.solve.normals.trust.judging import Judging
 from psvideo.solve.normals.trust.moving_doubt import (
     MOST_DEG,
-    Checked,
     MovingDoubt,
-    checked,
     moved_deg,
     moving_doubt_deg,
 )
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
+from psvideo.solve.normals.trust.witness import Checked, checked
 
 SIDE = 96
 HOW = MovingDoubt()

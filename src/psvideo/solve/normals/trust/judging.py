@@ -18,15 +18,17 @@ from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.surface_bits import bits
+from psvideo.solve.normals.trust.agreeing import Agreeing, agreeing
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.doubts import Doubt, Doubts
-from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, checked, moved_deg, moving_doubt_deg
+from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, at_points, moved_deg, moving_doubt_deg, stirring
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.noise_spread import NoiseSpread, Spreading
 from psvideo.solve.normals.trust.repeats import Repeat
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, every_nth
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
+from psvideo.solve.normals.trust.witness import checked
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,8 +79,8 @@ def judged(
     misfit = surface.misfit
     if misfit is not None and points.known.any():
         misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, shown.lost_deg), near, how)
-    doubt = shown.doubt_deg
-    for more in (moving, near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
+    doubt = shown.doubt_deg if moving is None else moving.beside(shown.doubt_deg)
+    for more in (near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, shown.usual_deg])
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
@@ -95,17 +97,34 @@ def _trusted_moving(error: NDArray[np.floating], moves: Mask, limit_deg: float) 
     return np.asarray(grown & (error > 0) & (error <= error.dtype.type(limit_deg)))
 
 
-def _found(points: ThinSurface, one: Evidence, noise: PlateNoise, how: Judging) -> tuple[Doubt, Floats | None]:
+@dataclass(frozen=True, kw_only=True)
+class _Moving:
+    """By how many degrees motion may turn normals, (row, col), and what the lights say of it, None where they cannot
+    be held against each other."""
+
+    deg: Floats
+    agree: Agreeing | None
+
+    def beside(self, doubt_deg: Floats) -> Floats:
+        """Return what this and another doubt come to."""
+        both = np.hypot(doubt_deg, self.deg)
+        return both if self.agree is None else self.agree.limited(both)
+
+
+def _found(points: ThinSurface, one: Evidence, noise: PlateNoise, how: Judging) -> tuple[Doubt, _Moving | None]:
     """Return what signs make of the points, and by how much motion may turn them, None where nothing moved."""
     turned_deg = moved_deg(points, one, noise)
     signs = signs_of(points, one, turned_deg)
     if turned_deg is None:
         return Doubt.of(signs, how.doubting), None
     known, check = points.known.astype(np.float32), checked(points, one, noise)
-    moving = moving_doubt_deg(
+    deg = moving_doubt_deg(
         turned_deg, signs.torn_deg, known, one.moves, steadied=one.steadied, check=check, how=how.moving
     )
-    return Doubt.of(signs, how.doubting), moving
+    moves = at_points(one.moves, known.shape)
+    stirs = stirring(turned_deg, known, moves, steadied=one.steadied, how=how.moving)
+    agree = agreeing(points, one, noise, signs, stirs, how.doubting)
+    return Doubt.of(signs, how.doubting), _Moving(deg=deg, agree=agree)
 
 
 def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise) -> Surface:

@@ -10,19 +10,13 @@ from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, width_of
+from psvideo.solve.normals.trust.witness import SOLVED, Checked, left_over, noise_share
 
 MOST_DEG = np.float32(180)
 """What turns a normal by more is no angle: nothing is known of its plates."""
-SOLVED = 3
-"""This many lights are explained by a normal and an albedo, whatever they show."""
-MATTE = 0.03
-"""Surfaces that stand still leave this much of a light that is not noise, as a share of albedo: they are not quite
-matte, and rigs are a little off."""
-BESIDE = (3, 3)
-"""What normals leave is averaged over this many points, for noise leaves next to nothing here and there."""
 EXPLAINED = np.float32(0.05)
 """What nobody knows of plates is known after all where it is less likely than this that they are off."""
-MOST_ODDS, LEAST = np.float32(30), np.float32(1e-6)
+MOST_ODDS = np.float32(30)
 MOST_CHECKS = 2
 """More lights than this beyond three say no more of what is around."""
 OUTLINE = (17, 17)
@@ -77,15 +71,6 @@ class MovingDoubt:
     most_deg: float = 23.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Checked:
-    """How well plates of more than three lights, this many ``beyond`` three, are explained by one normal: ``puzzling``
-    (row, col) is 0 where they are as what stands still, up to 1 where they are not, or nothing checks them."""
-
-    beyond: int
-    puzzling: Floats
-
-
 def moved_deg(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS) -> Floats | None:
     """Return by which angle what is unsure of the plates turns the points' normals, in degrees; None where nothing
     moved. More than MOST_DEG is no angle: nothing is known there.
@@ -112,7 +97,7 @@ def moved_deg(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS)
     turned, likely = np.sqrt(turned) * scale, np.sqrt(likely) * scale
     if one.left is None or len(one.plates) <= SOLVED:
         return np.asarray(turned, np.float32)
-    dark = _noise_share(points, noise, float(strength.mean()))
+    dark = noise_share(points, noise, float(strength.mean()))
     share = _off_share(one.left, points.known, shown / (size * size), dark)
     known = (turned <= MOST_DEG) | (share < EXPLAINED)
     return np.asarray(np.where(known, likely * share, turned), np.float32)
@@ -124,36 +109,10 @@ def _off_share(left: Left, known: Mask, off: Floats, noise: Floats) -> Floats:
 
     ``off`` is the sum of squares that would be left, ``noise`` what is left of noise, both in units of albedo.
     """
-    free, usual, seen = _left_over(left, known, noise)
+    free, usual, seen = left_over(left, known, noise)
     square = off / np.maximum(free, 1) + usual
     odds = free * np.log(square / usual) - seen * (1 / usual - 1 / square)
     return np.asarray(np.where(free > 0, 1 / (1 + np.exp(np.clip(odds / 2, -MOST_ODDS, MOST_ODDS))), 1), np.float32)
-
-
-def _noise_share(points: ThinSurface, noise: PlateNoise, lamp: float) -> Floats:
-    """Return how large noise is beside albedo: in the dark, and where repeats show more, in light."""
-    dark = np.asarray(np.float32(noise.dark / lamp) / np.maximum(points.brightness, LEAST), np.float32)
-    if points.noisier is None:
-        return dark
-    return np.asarray(np.maximum(dark, np.radians(points.noise_deg * np.sqrt(points.noisier))), np.float32)
-
-
-def _left_over(left: Left, known: Mask, noise: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return how many lights check a normal, the square that each usually leaves, and all that is left around."""
-    free = np.maximum(left.lights - np.float32(SOLVED), 0)
-    usual = np.float32(MATTE**2) + noise * noise
-    seen = cv2.blur(left.squares * known, BESIDE) / np.maximum(cv2.blur(known.astype(np.float32), BESIDE), LEAST)
-    return free, usual, np.asarray(seen, np.float32)
-
-
-def checked(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS) -> Checked | None:
-    """Return how well one normal explains the points' plates; None where three lights leave nothing to see."""
-    if one.left is None or len(one.plates) <= SOLVED:
-        return None
-    dark = _noise_share(points, noise, float(one.lit.intensities.mean()))
-    free, usual, seen = _left_over(one.left, points.known, dark)
-    puzzling = np.where(free > 0, 1 - np.exp(-seen / (2 * np.maximum(free, 1) * usual)), 1)
-    return Checked(beyond=len(one.plates) - SOLVED, puzzling=np.asarray(puzzling, np.float32))
 
 
 def moving_doubt_deg(
@@ -173,32 +132,44 @@ def moving_doubt_deg(
     still, on a grid of its own, ``moves``, do not speak for each other. Of plates that were ``steadied`` nothing else
     was followed, and what is torn is an edge as at rest. ``check`` is what more than three lights say.
     """
-    size, own = (width_of(known, how.around),) * 2, np.zeros(known.shape, np.bool_)
-    if moves is not None:
-        grown = cv2.resize(moves.astype(np.uint8), known.shape[::-1], interpolation=cv2.INTER_NEAREST)
-        own = grown > 0
+    size, own = (width_of(known, how.around),) * 2, at_points(moves, known.shape)
     tells = known * (turned_deg <= MOST_DEG)  # beyond that nothing is known, and nothing is said of what is around
     turned = own_mean(np.minimum(turned_deg, np.float32(60)) * tells, size, own)
     around = turned / np.maximum(own_mean(tells, size, own), np.float32(1e-6))
-    stirs = own if steadied else (turned_deg > how.stirring_deg) | own
-    apart = _torn_doubt(turned_deg, torn_deg, tells, (own, stirs), check, how)
+    stirs = stirring(turned_deg, tells, own, steadied=steadied, how=how)
+    apart = stirs * _torn_doubt(turned_deg, torn_deg, tells, own, check, how)
     enough_deg = how.around_deg * (1 if check is None else 1 + min(check.beyond, MOST_CHECKS))
     doubt = np.float32(how.own) * turned_deg + around * around / np.float32(enough_deg) + apart
     return np.asarray(np.minimum(doubt, np.float32(how.most_deg)), np.float32)
+
+
+def at_points(moves: Mask | None, shape: tuple[int, ...]) -> Mask:
+    """Return what ``moves``, on a grid of its own, at points of this ``shape``; None moves nowhere."""
+    if moves is None:
+        return np.zeros(shape, np.bool_)
+    grown = cv2.resize(moves.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST)
+    return np.asarray(grown > 0)
+
+
+def stirring(
+    turned_deg: Floats, known: Floats, moves: Mask, *, steadied: bool = False, how: MovingDoubt = MovingDoubt()
+) -> Floats:
+    """Return how far anything stirs near the points, 0 to 1 (row, col): what ``moves``, at the points themselves, and
+    what motion turns; of plates that were ``steadied`` only the former."""
+    stirs = moves if steadied else (turned_deg > how.stirring_deg) | moves
+    share = cv2.blur(stirs.astype(np.float32), (width_of(known, how.near),) * 2)
+    return np.asarray(np.minimum(share / np.float32(how.stirring_share), 1), np.float32)
 
 
 def _torn_doubt(
     turned_deg: Floats,
     torn_deg: Floats,
     known: Floats,
-    where: tuple[Mask, Mask],
+    moves: Mask,
     check: Checked | None,
     how: MovingDoubt,
 ) -> Floats:
-    """``where`` is what moves, and what stirs."""
-    moves, stirring = where
-    near, size = ((width_of(known, share),) * 2 for share in (how.near, how.torn_around))
-    stirs = cv2.blur(stirring.astype(np.float32), near)
+    size = (width_of(known, how.torn_around),) * 2
     around = cv2.blur(torn_deg * known, size) / np.maximum(cv2.blur(known, size), np.float32(1e-6))
     own = np.maximum(torn_deg - np.float32(how.least_torn_deg), 0)
     around = np.maximum(around - np.float32(how.least_around_deg), 0)
@@ -208,8 +179,7 @@ def _torn_doubt(
         own *= check.puzzling
     agreed = _on_outline(moves) & (turned_deg < how.agreed_deg)
     own *= np.where(agreed, np.float32(how.outline), 1)
-    apart = np.float32(how.torn) * own + around
-    return np.asarray(apart * np.minimum(stirs / np.float32(how.stirring_share), 1), np.float32)
+    return np.asarray(np.float32(how.torn) * own + around, np.float32)
 
 
 def _on_outline(moves: Mask) -> Mask:
