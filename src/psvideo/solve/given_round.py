@@ -28,6 +28,7 @@ class GivenRound:
     unsure: Floats | None
     moves: Mask | None
     steadied: bool
+    arc_deg: Floats | None = None
 
     @classmethod
     def of(cls, one: Round, *, masks: Masks | None, shares: Sequence[NDArray[np.float32]] | None) -> "GivenRound":
@@ -42,6 +43,7 @@ class GivenRound:
             unsure=_unsure(one, shares),
             moves=None if one.motion is None else one.motion.moves,
             steadied=one.motion is not None and one.motion.steadied,
+            arc_deg=None if one.motion is None else one.motion.arc_deg,
         )
 
     def under(self, lit: Illumination) -> LitPlates:
@@ -54,6 +56,7 @@ class GivenRound:
             unsure=self.unsure,
             moves=self.moves,
             steadied=self.steadied,
+            arc_deg=self.arc_deg,
         )
 
     @property

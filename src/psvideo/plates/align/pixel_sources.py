@@ -58,13 +58,14 @@ HALF, LEAST = np.float32(0.5), np.float32(1e-6)
 class Taken:
     """Of one light (row, col): where its plates ``alike`` show the same along the motion, ``source``, what a pixel is
     to be taken from, and where that is ``sure``; by how much it may be off, in units of the plates' light,
-    ``unsure``; and what it ``shows`` at the instant."""
+    ``unsure``; what it ``shows`` at the instant; and the codes of both plates moved there, ``ends``."""
 
     alike: Flags
     sure: Flags
     source: Codes8
     unsure: Floats
     shows: InstantSketch
+    ends: tuple[Codes8, Codes8]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +116,7 @@ def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
         source=source,
         unsure=unsure,
         shows=InstantSketch(codes=shown, white=pair.before.white, noise=noise),
+        ends=(plates.before, plates.after),
     )
 
 

@@ -26,6 +26,7 @@ from psvideo.plates.align.between import Ends, plate_at
 from psvideo.plates.align.by_surface import BySurface
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
+from psvideo.plates.align.doubt.turning import PlateEnds, arc_deg
 from psvideo.plates.align.doubt.unsure import UNKNOWN
 from psvideo.plates.align.left_out import AtInstant, better_without
 from psvideo.plates.align.light_history import Around, DueInstant, Held
@@ -37,7 +38,7 @@ from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
-from psvideo.plates.align.velocity.moving_kernel import NOWHERE
+from psvideo.plates.align.velocity.moving_kernel import BOTH, NOWHERE
 from psvideo.plates.align.velocity.own_flow import OwnFlow
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
@@ -223,7 +224,9 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
         shown = [kept.taken(one, pair, motion) for one, pair in zip(shown, pairs, strict=True)]
         sources = [kept.source(one, own) for one, own in zip(shown, sources, strict=True)]
         unknown, guesses = unknown & ~kept.stands, [one.source for one in shown]
-    instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
+    taken = dict(zip(lights, shown, strict=True))
+    instant.motion = motion = replace(motion, arc_deg=_arc_deg(held, instant, taken, sources))
+    instant.unsure = _unsure(held, instant, taken, sources)
     instant.unsure[:, unknown] = UNKNOWN
     own = dict[str, OwnFlow]()
     if instant.guessed and steady is None:
@@ -310,6 +313,25 @@ def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: S
         own = unsure[held.lights.index(light)]
         own[:] = np.hypot(own, one.unsure) * (source != NOWHERE)
     return unsure
+
+
+def _arc_deg(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes8]) -> Floats | None:
+    """Return by how many degrees normals may be off because what is blended turns between two plates of a light, (row,
+    col); None where the lights do not tell."""
+    if held.lamps is None:
+        return None
+    ends, shape = list[PlateEnds](), sources[0].shape
+    for light in held.lights:
+        sketch = held.shots[light][instant.round].sketch
+        if light in taken:
+            ends.append((*taken[light].ends, taken[light].shows.white))
+        elif sketch is not None:
+            still = InstantSketch.standing(sketch, shape)
+            ends.append((still.codes, still.codes, still.white))
+    if len(ends) < len(held.lights):
+        return None
+    blended = np.any([source == BOTH for source in sources], axis=0)
+    return np.asarray(arc_deg(held.lamps.matrix, ends) * blended, np.float32)
 
 
 def _moved_to(

@@ -20,7 +20,8 @@ class LitPlates:
     ``seen``: which rows (light, row) or pixels (light, row, col) every light shows; ``mask`` (row, col): where to
     solve; both everything where they are left out. ``unsure`` (light, row, col), on a grid of its own over the picture,
     is by how much plates may be off for motion; ``moves`` (row, col), on that grid, where something was followed;
-    ``steadied``: beside that plates were brought together by one shift of the whole picture.
+    ``steadied``: beside that plates were brought together by one shift of the whole picture. ``arc_deg`` (row, col),
+    on that grid too, is by how much normals may be off because what moves turns between two plates of a light.
     """
 
     plates: Plates
@@ -31,6 +32,7 @@ class LitPlates:
     unsure: Floats | None = None
     moves: Mask | None = None
     steadied: bool = False
+    arc_deg: Floats | None = None
     black_level: float = 0.0
     scale: float = 1.0
 

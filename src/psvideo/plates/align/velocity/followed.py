@@ -25,7 +25,8 @@ class Followed:
     (row, col) is what clearly stands beside that; the rest looks alike either way. ``unchanged`` (row, col) is
     under how many of all lights a pixel that does not move shows the same before and after. Each of these pixels is
     ``step`` by ``step`` of the sketches'. ``carried`` is how fast a camera that shakes shifts all of the picture, x and
-    y in its own pixels per second, None where it does not; the velocity is what comes on top."""
+    y in its own pixels per second, None where it does not; the velocity is what comes on top. ``arc_deg`` (row, col) is
+    by how much normals may be off because what moves turns between two plates of a light; None where nobody knows."""
 
     time_s: float
     velocity: Floats
@@ -34,6 +35,7 @@ class Followed:
     unchanged: NDArray[np.int16] = field(default_factory=lambda: np.zeros((1, 1), np.int16))
     step: int = 1
     carried: tuple[float, float] | None = None
+    arc_deg: Floats | None = None
 
     @functools.cached_property
     def nearby(self) -> Floats:

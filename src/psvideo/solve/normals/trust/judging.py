@@ -80,7 +80,8 @@ def judged(
     if misfit is not None and points.known.any():
         misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, shown.lost_deg), near, how)
     doubt = shown.doubt_deg if moving is None else moving.beside(shown.doubt_deg)
-    for more in (near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
+    turned = None if moving is None or one.arc_deg is None else _at_points(one.arc_deg, points.known.shape)
+    for more in (turned, near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, shown.usual_deg])
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
@@ -89,6 +90,11 @@ def judged(
     slope_deg = _usual(shown.by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
     lit = shown.shadows_lit
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg, shadows_lit=lit), doubts
+
+
+def _at_points(plane: Floats, shape: tuple[int, ...]) -> Floats:
+    """Return what a plane on a grid of its own is at points of this shape."""
+    return np.asarray(cv2.resize(plane, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def _trusted_moving(error: NDArray[np.floating], moves: Mask, limit_deg: float) -> Mask:
