@@ -75,10 +75,10 @@ def judged(
         doubts = doubts.and_of(found, noise)
     doubts = replace(doubts, latest=latest)
     shown = doubts.mean
-    at_points = spread.judged(points.surface, np.stack([shown.doubt_deg, shown.usual_deg]), 1, limit_deg=0.0)[0]
+    errors = spread.judged(points.surface, np.stack([shown.doubt_deg, shown.usual_deg]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit
     if misfit is not None and points.known.any():
-        misfit = _typical(misfit, points, at_points, np.hypot(points.noise_deg, shown.lost_deg), near, how)
+        misfit = _typical(misfit, points, errors, np.hypot(points.noise_deg, shown.lost_deg), near, how)
     doubt = shown.doubt_deg if moving is None else moving.beside(shown.doubt_deg)
     turned = None if moving is None or one.arc_deg is None else _at_points(one.arc_deg, points.known.shape)
     for more in (turned, near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
@@ -99,8 +99,7 @@ def _at_points(plane: Floats, shape: tuple[int, ...]) -> Floats:
 
 def _trusted_moving(error: NDArray[np.floating], moves: Mask, limit_deg: float) -> Mask:
     """Return what was solved within the limit and moves, of ``moves`` on a grid of its own, (row, col)."""
-    grown = cv2.resize(moves.view(np.uint8), error.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-    return np.asarray(grown & (error > 0) & (error <= error.dtype.type(limit_deg)))
+    return np.asarray(at_points(moves, error.shape) & (error > 0) & (error <= error.dtype.type(limit_deg)))
 
 
 @dataclass(frozen=True, kw_only=True)
