@@ -28,6 +28,7 @@ from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_kernel import fill_roughness_in_the_fit
 from psvideo.solve.normals.robust.reflecting import _rough as rough_in_loops
+from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
 
@@ -236,6 +237,32 @@ def test_what_is_unsure_for_motion_says_nothing_of_the_subject() -> None:
     patchy = np.where(np.random.default_rng(3).random(unsure.shape[1:]) < 0.5, np.float32(0.2), np.float32(0))
     unsure[5] = patchy  # what lies between is said to be sure by chance
     assert Solving().look(LitPlates(plates, under(WAYS), unsure=unsure)) is None
+
+
+def test_a_look_weighs_lights_by_what_stands_as_solving_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where what moves is far brighter, its light would have noise count less than it does for what stands."""
+    found = list[Surface]()
+
+    def noted(given: LitPlates, one: Surface, usable: Usable, *, step: int) -> SubjectPoints | None:
+        found.append(replace(one, normals=one.normals.copy()))
+        return points_of(given, one, usable, step=step)
+
+    monkeypatch.setattr(huber1981, "points_of", noted)
+    moves = np.arange(SIZE) < 0.6 * SIZE
+    strengths = np.resize([1.0, 0.1], len(WAYS))
+    rng, shades = np.random.default_rng(2), np.maximum(np.einsum("lx,rcx->lrc", WAYS, waves()), 0)
+    clean = shades * strengths[:, None, None] * np.where(moves, 0.8, 0.04)
+    clean += 0.3 * clean * moves * rng.normal(size=shades.shape)
+    plates = [*(clean + rng.normal(0, 0.001, clean.shape)).astype(np.float32)]
+    lit = Illumination(directions=WAYS, intensities=strengths[:, None])
+    noise = PlateNoise(read=1e-6, photon=0.0)
+    for known in (moves, np.zeros(SIZE, np.bool_)):
+        found.clear()
+        given = LitPlates(plates, lit, moves=np.tile(known[None, ::2], (SIZE // 2, 1)))
+        huber1981.solve(given, plate_noise=noise)
+        assert huber1981.look(given, plate_noise=noise) is not None
+        solved, looked = found
+        assert np.array_equal(solved.normals, looked.normals)
 
 
 def test_a_take_looks_at_what_is_sure_in_its_rounds() -> None:

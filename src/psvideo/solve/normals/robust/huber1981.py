@@ -98,7 +98,7 @@ def look(
     """
     noise, reweighting = _noise_of(plate_noise, given.lit), _dimmed(reweighting, plate_noise)
     solution = Solution.of(given, usable, noise, AskedSurface(residual=False, spare=spare))
-    found, misfit, step = first_look(solution, given.lit, reweighting, noise, given.unsure)
+    found, misfit, step = first_look(solution, given.lit, reweighting, noise, given.unsure, given.moves)
     return None if misfit is None else points_of(given, found, usable, step=step)
 
 
