@@ -24,12 +24,13 @@ from psvideo.sync.frames_taken import FramesTaken, timing_of_take
 from psvideo.sync.named_strobe import FoundStrobe, named_strobe
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.quiet import loud_part
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.elsewhere import rows_open_at_once
-from psvideo.sync.verdict.few_kinds import in_step_with_frames, other_times_as_well, shows_the_same
+from psvideo.sync.verdict.few_kinds import comes_again, in_step_with_frames, other_times_as_well, shows_the_same
 from psvideo.sync.verdict.overexposed import overexposed
-from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
+from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, too_few_lit, why_not
 
 ADVICE = (
     "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the lights "
@@ -127,9 +128,11 @@ def _refuse_where_others_fit(plan: Plan, rows: Profiles, verdict: Verdict, clip:
 
 
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
-    if shows_the_same(plan, found.rows, found.fit.beat):
+    kept, beat = found.rows, found.fit.beat
+    if shows_the_same(plan, kept, beat) and comes_again(plan, kept, beat):
         return f"{clip}: {in_step_with_frames(plan)}"
-    reason = overexposed(rows) or why_not(plan, rows) or clock_too_far(plan, found)
+    lit = rows.take(loud_part(rows))
+    reason = overexposed(rows) or too_few_lit(plan, rows) or why_not(plan, lit) or clock_too_far(plan, found)
     explained = f"explains {100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
     if found.steps:
         explained = (

@@ -1,7 +1,8 @@
 """The strobe's times from row profiles: one model of what rows see, searched coarsely, tracked, and sharpened.
 
 ``fit`` does it: begin there; ``best_fit`` is its middle, where some rows are fitted as well as they can be. ``beat``
-holds the times that are looked for, ``profiles`` the data. ``unlit`` leaves out frames in the dark beforehand.
+holds the times that are looked for, ``profiles`` the data. ``unlit`` leaves out frames in the dark beforehand, and
+``quiet`` finds those that change by noise alone.
 
 - the model, compiled: ``given_off`` (a flash's light over time), ``row_model`` (what rows see of it), ``row_slopes``
   (how that changes with the times); and its fit, ``kernel`` and ``projection``; ``compiled_profiles`` calls them

@@ -13,6 +13,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, twins
 from psvideo.sync.rowfit.compiled_profiles import slot_unknowns
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.quiet import loud_part
 
 DARK, FLOOR = 0.02, 0.02
 """A frame is dark whose rows lie above their darkest, a quantile of each, by less than half this share of their spreads
@@ -41,8 +42,16 @@ def unlit(plan: Plan, rows: Profiles) -> Mask:
     few = rows.binned(ROWS)
     dark = _above_floor(few, max(FLOOR * len(few.value), STRAY * _longest_run(plan, rows, REPEATED_LEAST))) < DARK / 2
     times = np.clip(1 + _longest(twins(few) & ~dark), REPEATED_LEAST, REPEATED_MOST)
-    found = _in_long_runs(dark, _longest_run(plan, rows, int(times)))
+    found = _in_long_runs(dark | _quiet_ends(rows), _longest_run(plan, rows, int(times)))
     return found if (~found).mean() > LEAST_SHARE else np.zeros_like(found)
+
+
+def _quiet_ends(rows: Profiles) -> Mask:
+    """Return the frames at either end that change by noise alone, shape (frame,): where lights are weak, it is more
+    than ``DARK`` of what rows change by."""
+    found = np.ones(len(rows.value), np.bool_)
+    found[loud_part(rows)] = False
+    return found
 
 
 def lit_twins(rows: Profiles) -> Mask:

@@ -3,6 +3,7 @@ and what to do."""
 
 import numpy as np
 
+from psvideo.model.arrays import Integers
 from psvideo.model.plan import Plan
 from psvideo.model.units import counted
 from psvideo.sync.rowfit.beat import Beat
@@ -13,6 +14,9 @@ ALIKE = 0.2
 """Frames that see the cycle at times which differ by less than this share of the shortest flash are alike."""
 SLOW = 3.0
 """A strobe that moves by no more than this many shortest flashes within a clip nearly keeps step with its frames."""
+AGAIN = 0.5
+"""Pictures come again where frames that see the cycle at one time change by less than this share of the squares by
+which frames that follow one another do. (Lights at rest: 0.00; a subject that tumbles: 0.1 to 0.2; noise: 1.)"""
 
 
 def shows_the_same(plan: Plan, rows: Profiles, beat: Beat) -> bool:
@@ -32,16 +36,38 @@ def shows_few(plan: Plan, rows: Profiles, beat: Beat) -> bool:
     return _few_kinds(plan, rows, beat, SLOW)
 
 
+def comes_again(plan: Plan, rows: Profiles, beat: Beat) -> bool:
+    """Return whether frames that see the cycle at the same time show the same picture, each of them several times: what
+    few frames show, or what noise does, does not come again however few kinds of frames there are."""
+    kind, count, _ = _kinds(plan, rows, beat)
+    if len(kind) < 2 * count:
+        return False
+    order = np.lexsort((rows.index, kind))
+    same = np.diff(kind[order]) == 0
+    again = np.diff(rows.value[order], axis=0)[same]
+    onward = np.diff(rows.value[np.argsort(rows.index, kind="stable")], axis=0)
+    return float((again**2).mean()) < AGAIN * float((onward**2).mean())
+
+
 def _few_kinds(plan: Plan, rows: Profiles, beat: Beat, moved: float) -> bool:
     """Return whether frames see the cycle around no more times than a row has brightnesses, and at those within so many
     of the shortest flash."""
-    cycle_s, alike_s = plan.cycle_s * beat.clock.rate, ALIKE * plan.shortest_flash_s
-    at_s = np.sort(rows.frame_start_s % cycle_s)
-    gaps_s = np.diff(np.append(at_s, at_s[0] + cycle_s))
-    apart = gaps_s > alike_s
-    kinds = max(int(apart.sum()), 1)
-    within_s = cycle_s - gaps_s[apart].sum()
+    _, kinds, within_s = _kinds(plan, rows, beat)
     return kinds <= len(plan.lit_slots) + 1 and within_s < kinds * moved * plan.shortest_flash_s
+
+
+def _kinds(plan: Plan, rows: Profiles, beat: Beat) -> tuple[Integers, int, float]:
+    """Return around which of a few times each frame sees the cycle (frame,), around how many, and for how long these
+    last together, in seconds."""
+    cycle_s, alike_s = plan.cycle_s * beat.clock.rate, ALIKE * plan.shortest_flash_s
+    at_s = rows.frame_start_s % cycle_s
+    order = np.argsort(at_s, kind="stable")
+    gaps_s = np.diff(np.append(at_s[order], at_s[order[0]] + cycle_s))
+    apart = gaps_s > alike_s
+    count = max(int(apart.sum()), 1)
+    kind = np.empty(len(at_s), np.int64)
+    kind[order] = (np.cumsum(apart) - apart) % count  # a gap lies behind its frame, and the last time may be the first
+    return kind, count, float(cycle_s - gaps_s[apart].sum())
 
 
 def in_step_with_frames(plan: Plan) -> str:

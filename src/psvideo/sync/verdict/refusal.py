@@ -7,6 +7,9 @@ from psvideo.model.units import counted, show_seconds
 from psvideo.sync.rowfit.coarse.seed import SEARCH_ROWS
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.quiet import NOISE, likeness, loud_part
+from psvideo.sync.rowfit.strobed import least_frames as enough_to_tell
+from psvideo.sync.rowfit.unlit import LEAST_SHARE
 from psvideo.sync.verdict.other_strobe import other_plan, other_strobe
 from psvideo.sync.verdict.overexposed import overexposed_throughout
 
@@ -22,10 +25,9 @@ picture in a few rounds. (Balls that cross it in 0.1 to 0.4 s: 0.08 to 0.68, mos
 another strobe: 0.04 to 0.16.)"""
 SHOWN = 0.05
 """Rounds with less than this share of the brightest one's light show nothing."""
-NOISE = 0.15
-"""Correlation of neighbouring rows' changes below which there is nothing but noise."""
 MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
 """No two clocks are further apart than this, errors of short clips included."""
+FILM_ON = "Film on while the strobe plays; if it did, open the lens, raise the gain, or bring the lights nearer."
 LEAST_ROWS = 2
 """Rows of which the time from one to the next can be asked for at all."""
 
@@ -58,13 +60,50 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
             "no strobe like the plan's was found in the picture: its rows do not change at all from frame to frame. "
             "Check that the lights flashed, that the lens was open, and that this is the right clip."
         )
-    if _likeness(changes) < NOISE:
+    if likeness(changes) < NOISE:
         return overexposed_throughout(rows) or (
             "no strobe like the plan's was found in the picture: what changes from frame to frame is noise, which "
             f"neighbouring rows do not share (mean level {float(rows.value.mean()):.2g} of saturation). Check that the "
             "lights flashed and are bright enough; open the lens or raise the gain."
         )
-    return ""
+    return _hardly_lit(plan, rows, least)
+
+
+def _hardly_lit(plan: Plan, rows: Profiles, least: int) -> str:
+    """Return that nearly all frames are dark, and fewer show flashes than can be timed; or nothing."""
+    loud = loud_part(rows)
+    count = loud.stop - loud.start
+    if count >= least or count > LEAST_SHARE * len(rows.value):
+        return ""
+    return (
+        f"no strobe like the plan's was found in the picture: {_where_dark(rows, loud)} It takes {least} frames with "
+        f"flashes at least, and 50 or more make it sure. {FILM_ON}"
+    )
+
+
+def too_few_lit(plan: Plan, rows: Profiles) -> str:
+    """Return that most of what is no noise may be too short to tell anything, where frames at either end are dark, and
+    what to do; or nothing."""
+    loud = loud_part(rows)
+    count = loud.stop - loud.start
+    if count == len(rows.value) or count >= enough_to_tell(plan):
+        return ""
+    flashes = counted(len(plan.lit_slots), "flash")
+    return (
+        f"{_where_dark(rows, loud).capitalize()} These are few to tell {flashes} a round by: 50 or more make it sure. "
+        f"{FILM_ON}"
+    )
+
+
+def _where_dark(rows: Profiles, loud: slice) -> str:
+    """Say which frames at either end are dark, and how many are not."""
+    first, last = int(rows.index[loud.start]), int(rows.index[loud.stop - 1])
+    ends = [f"{int(rows.index[0])} to {first - 1}"] if loud.start else []
+    ends += [f"{last + 1} to {int(rows.index[-1])}"] if loud.stop < len(rows.value) else []
+    return (
+        f"frames {' and '.join(ends)} are dark and change by noise alone, as before the strobe begins, under a lens "
+        f"cap, or under lights that are too weak, and {loud.stop - loud.start} of {len(rows.value)} show flashes."
+    )
 
 
 def least_frames(plan: Plan) -> int:
@@ -82,15 +121,6 @@ def _changes(plan: Plan, rows: Profiles) -> np.ndarray:
     lag = int(onward[np.argmax(moved_s >= enough_s)])
     change: np.ndarray = value[lag:] - value[:-lag]
     return change
-
-
-def _likeness(changes: np.ndarray) -> float:
-    """Return the correlation of neighbouring rows' changes from frame to frame."""
-    if changes.shape[1] < 2:
-        return 1.0
-    above, below = changes[:, :-1], changes[:, 1:]
-    together = float(np.sqrt((above**2).sum() * (below**2).sum()))  # 0 where but the first or the last row changes
-    return float((above * below).sum()) / together if together else 0.0
 
 
 def why_not(plan: Plan, rows: Profiles) -> str:
