@@ -50,6 +50,14 @@ def _relax(ties: Any, inverse: Any, right: Any, height: Any, line: Any, colour: 
             out[k] = (line[k] + east[k] * beside[k] + west[k - 1] * beside[k - 1]) * per[k]
 
 
+@REORDERED.inlined
+def _relax_behind(ties: Any, inverse: Any, right: Any, height: Any, line: Any, step: int) -> None:
+    """Relax colours 1, 0 and 1 behind the row ``step``, each a row behind the one before."""
+    for behind in range(1, 4):
+        if 1 <= step - behind < height.shape[1] - 1:
+            _relax(ties, inverse, right, height, line, behind % 2, step - behind)
+
+
 @REORDERED.called
 def pull(ties: Any, height: Any, line: Any, colour: int, row: int) -> None:
     """Fill a line with what a row's neighbours pull it up by: the sum of weight times (neighbour - pixel)."""
@@ -110,12 +118,7 @@ def descend(
     for step in range(1, rows + 5):
         if step <= rows:
             _start(inverse, right, height, step)
-        if 1 <= step - 1 <= rows:
-            _relax(ties, inverse, right, height, line, 1, step - 1)
-        if 1 <= step - 2 <= rows:
-            _relax(ties, inverse, right, height, line, 0, step - 2)
-        if 1 <= step - 3 <= rows:
-            _relax(ties, inverse, right, height, line, 1, step - 3)
+        _relax_behind(ties, inverse, right, height, line, step)
         row = step - 4
         if row >= 1:
             pull(ties, height, line, 0, row)
@@ -148,12 +151,7 @@ def ascend(ties: Any, inverse: Any, right: Any, height: Any, coarse: Any, line: 
     for step in range(1, rows + 5):
         if step <= rows:
             _add_blocks(coarse, height, line, step)
-        if 1 <= step - 1 <= rows:
-            _relax(ties, inverse, right, height, line, 1, step - 1)
-        if 1 <= step - 2 <= rows:
-            _relax(ties, inverse, right, height, line, 0, step - 2)
-        if 1 <= step - 3 <= rows:
-            _relax(ties, inverse, right, height, line, 1, step - 3)
+        _relax_behind(ties, inverse, right, height, line, step)
         if step - 4 >= 1:
             _relax(ties, inverse, right, height, line, 0, step - 4)
 

@@ -14,7 +14,14 @@ from psvideo.compute.spilled import bands, kept_in, let_go, lie_in_files, room_f
 from psvideo.model.arrays import Doubles, Floats
 from psvideo.solve.depth.checkerboard import empty_board
 from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, set_up_levels, solve, weighed
-from psvideo.solve.depth.reweighting import add_board, fill_equations, pull_to_pins, weigh_sides, write_board
+from psvideo.solve.depth.reweighting import (
+    Shares,
+    add_board,
+    fill_equations,
+    pull_to_pins,
+    weigh_sides,
+    write_board,
+)
 from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import Slopes
 
@@ -60,19 +67,18 @@ class TakenOver:
 
 @dataclass(frozen=True, kw_only=True)
 class _Work:
-    """One integration: what is given of the surface, the height so far and the shares, changed in place, and memory."""
+    """One integration: the slopes in 32 bits, the height so far and the shares, changed in place, and memory."""
 
-    given: tuple[Floats, Floats, Floats, np.float32]
+    slopes: Slopes
     height: Doubles
-    rightward: Floats
-    downward: Floats
+    shares: Shares
     lines: Floats
     grids: Grids
 
     def in_bands(self, run: Callable[[int, int], None], *more: NDArray[np.floating]) -> None:
         """Call ``run(first, last)`` for bands of rows, after each of which what lies in files is let go, ``more``
         planes too: the equations are solved on the grids alone."""
-        own: list[NDArray[np.floating]] = [*self.given[:3], self.height, self.rightward, self.downward]
+        own: list[NDArray[np.floating]] = [*self.slopes[:3], self.height, *self.shares]
         planes = [plane for plane in (*own, *more) if plane.flags.c_contiguous]
         for first, last in bands(len(self.height)):
             run(first, last)
@@ -90,10 +96,10 @@ def find_height(
     height, rightward, downward = _room_at_first(slopes, poisson_height(slopes) if whole else None, spare)
     if lie_in_files(height):
         give_back()  # what the solver of normals left free lies beside the grids, and may be as large
-    work = _begun(slopes, height, rightward, downward)
+    work = _begun(slopes, height, Shares(rightward, downward))
     if not (whole and how.sharpness == 0.0):
         _find(work, how, held)
-    return work.height, work.rightward, work.downward
+    return work.height, *work.shares
 
 
 def _find(work: _Work, how: Integration, held: TakenOver | None) -> None:
@@ -112,7 +118,7 @@ def _find(work: _Work, how: Integration, held: TakenOver | None) -> None:
             break
         before = energy
     _settle(work, last, most=MOST_REFINEMENTS, held=None if how.sharpness == 0.0 else held)
-    facing = work.given[0]
+    facing = work.slopes.facing
 
     def empty(first: int, last: int) -> None:
         work.height[first:last][facing[first:last] == 0.0] = 0.0
@@ -125,7 +131,7 @@ def _take_over(work: _Work, held: TakenOver) -> None:
 
     def take(first: int, last: int) -> None:
         same = held.same[first:last]
-        for own, other in ((work.rightward, held.rightward), (work.downward, held.downward)):
+        for own, other in ((work.shares.rightward, held.rightward), (work.shares.downward, held.downward)):
             own[first:last][same] = other[first:last][same]
 
     work.in_bands(take, held.rightward, held.downward)
@@ -142,16 +148,15 @@ def _room_at_first(slopes: Slopes, height: Doubles | None, spare: Path | None) -
     return room_for(shape, np.float64, spare) if height is None else kept_in(height, spare), rightward, downward
 
 
-def _begun(slopes: Slopes, height: Doubles, rightward: Floats, downward: Floats) -> _Work:
+def _begun(slopes: Slopes, height: Doubles, shares: Shares) -> _Work:
     rows, cols = slopes.facing.shape
     facing, across, down = (
         plane.astype(np.float32, copy=False) for plane in (slopes.facing, slopes.across, slopes.down)
     )
     return _Work(
-        given=(facing, across, down, np.float32(slopes.aspect)),
+        slopes=Slopes(facing, across, down, np.float32(slopes.aspect)),
         height=height,
-        rightward=rightward,
-        downward=downward,
+        shares=shares,
         lines=np.zeros((2, cols), np.float32),
         grids=empty_grids((rows, cols)),
     )
@@ -159,11 +164,11 @@ def _begun(slopes: Slopes, height: Doubles, rightward: Floats, downward: Floats)
 
 def _weigh(work: _Work, sharpness: float) -> float:
     """Make the shares those of the height; return the energy."""
-    energy, sides = 0.0, (work.rightward, work.downward, work.lines)
+    energy, sides = 0.0, (work.shares, work.lines)
 
     def weigh(first: int, last: int) -> None:
         nonlocal energy
-        energy = float(weigh_sides(work.height, *work.given, np.float32(sharpness), *sides, first, last, energy))
+        energy = float(weigh_sides(work.height, work.slopes, np.float32(sharpness), *sides, first, last, energy))
 
     work.in_bands(weigh)
     return energy
@@ -173,10 +178,9 @@ def _lacking(work: _Work, *, share: float = 1.0) -> None:
     """Put the equations for the shares onto the finest grid, with what they lack at a share of the height."""
     finest = work.grids.levels[0]
     finest.right[:] = 0
-    shares = work.rightward, work.downward
 
     def put(first: int, last: int) -> None:
-        fill_equations(work.height, *work.given, *shares, finest.ties, finest.right, share, first, last)
+        fill_equations(work.height, work.slopes, work.shares, finest.ties, finest.right, share, first, last)
 
     work.in_bands(put)
 

@@ -6,12 +6,14 @@ sum over p of w+ (a d+ - n)^2 + w- (a d- - n)^2. Where a neighbour is missing, t
 make, a d = n, stands in for comparing (the paper leaves that open).
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from psvideo.compute.compiled import REORDERED
+from psvideo.model.arrays import Floats
 from psvideo.solve.depth.checkerboard import HALF, ONE, ZERO
+from psvideo.solve.depth.view import Slopes
 
 LEAST_SHARE = np.float32(1e-6)
 """A part held by less would float away on rounding errors."""
@@ -27,6 +29,13 @@ P = tuple(
 Q = tuple(
     np.float32(x) for x in (4.89352518554385e-03, 2.26843463243900e-03, 1.18534705686654e-04, 1.19825839466702e-06)
 )
+
+
+class Shares(NamedTuple):
+    """How much a pixel's steps to the right and down count against the opposite ones, (row, col) each, 0 to 1."""
+
+    rightward: Floats
+    downward: Floats
 
 
 @REORDERED.inlined
@@ -78,31 +87,21 @@ def _col_steps(height: Any, facing: Any, slope: Any, aspect: Any, row: int, to: 
 
 @REORDERED.kept
 def weigh_sides(
-    height: Any,
-    facing: Any,
-    across: Any,
-    down: Any,
-    aspect: Any,
-    sharpness: Any,
-    rightward: Any,
-    downward: Any,
-    lines: Any,
-    first: int,
-    last: int,
-    energy: float,
+    height: Any, slopes: Slopes, sharpness: Any, shares: Shares, lines: Any, first: int, last: int, energy: float
 ) -> float:
-    """Fill some rows' shares of their right (rightward) and lower (downward) steps; return the energy at the height,
-    added to that of the rows before.
+    """Fill some rows' shares of their right and lower steps; return the energy at the height, added to that of the
+    rows before.
 
     ``sharpness`` is k, 0 for equal shares; ``lines`` (2, col) is memory.
     """
+    facing, across, down, aspect = slopes
     ahead, behind = lines[0], lines[1]
     for row in range(first, last):
         _row_steps(height[row], facing[row], across[row], ahead, behind)
-        energy += _weigh(ahead, behind, across[row], sharpness, rightward[row])
+        energy += _weigh(ahead, behind, across[row], sharpness, shares.rightward[row])
         _col_steps(height, facing, down, aspect, row, row + 1, ahead)
         _col_steps(height, facing, down, aspect, row, row - 1, behind)
-        energy += _weigh(ahead, behind, down[row], sharpness, downward[row])
+        energy += _weigh(ahead, behind, down[row], sharpness, shares.downward[row])
     return energy
 
 
@@ -117,21 +116,12 @@ def _tie(share: Any, facing: Any, slope: Any, next_share: Any, next_facing: Any,
 
 @REORDERED.kept
 def fill_equations(
-    height: Any,
-    facing: Any,
-    across: Any,
-    down: Any,
-    aspect: Any,
-    rightward: Any,
-    downward: Any,
-    ties: Any,
-    lacking: Any,
-    share: float,
-    first: int,
-    last: int,
+    height: Any, slopes: Slopes, shares: Shares, ties: Any, lacking: Any, share: float, first: int, last: int
 ) -> None:
     """Fill some rows' ties and add to what every pixel's equation lacks at a share of a height, as boards (see
     ``checkerboard.py``)."""
+    facing, across, down, aspect = slopes
+    rightward, downward = shares
     rows, cols = height.shape
     for r in range(first, last):
         for c in range(cols - 1):

@@ -7,6 +7,7 @@ so a step is a slope in pixels here as well, and a shift of the height is a scal
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,8 +86,7 @@ def view_of(rig: Rig) -> View:
     return View(focal_px=rig.focal_px, principal_px=rig.principal_px)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Slopes:
+class Slopes(NamedTuple):
     """What normals say of the height: ``facing * d height / d col = across``, ``facing * d height / d row = down``.
 
     All of shape (row, col), about 1 at most. ``facing`` is the cosine towards the camera times the ray's length;
@@ -96,7 +96,7 @@ class Slopes:
     facing: NDArray[np.floating]
     across: NDArray[np.floating]
     down: NDArray[np.floating]
-    aspect: float = 1.0
+    aspect: float | np.float32 = 1.0
 
 
 def slopes_of(
