@@ -15,7 +15,7 @@ from psvideo.model.rows.ripple import Exposures, Ripple
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient import ambient_followed, ambient_off
 from psvideo.plates.ambient.ambient_blocks import block_px, no_blocks, over_bands
-from psvideo.plates.ambient.ambient_kernel import average_rows, measure_rows
+from psvideo.plates.ambient.ambient_kernel import AveragedDarks, OneMore, average_rows, measure_rows
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
 from psvideo.plates.mixing.mixture import mixture_of
@@ -358,13 +358,9 @@ def test_levels_of_blocks_are_means_and_change_steadily_between_their_middles(sh
     slots, spans = np.full((shape[0], cols), 4, np.float32), np.empty((shape[0], cols), np.float32)
     nothing, seen = np.zeros(shape[0], np.float32), np.ones(shape[0], np.bool_)
     restarts = np.zeros(slots.shape, np.bool_)
-    over_bands(
-        lambda a, b: average_rows(
-            bound.mix, block, 16, nothing, seen, restarts, gain.reshape(rows, -1), old.planes, slots, a, b, new.planes,
-            spans, coarse,
-        ),
-        shape,
-    )  # fmt: skip
+    one = OneMore(factor=nothing, seen=seen, restarts=restarts, gain=gain.reshape(rows, -1))
+    before, after = AveragedDarks(*old.planes, slots), AveragedDarks(*new.planes, spans)
+    over_bands(lambda a, b: average_rows(bound.mix, block, 16, one, before, a, b, after, coarse), shape)
     middles = [(np.arange(count) + 0.5) * block - 0.5 for count in (rows, cols)]
     down = [np.interp(np.arange(shape[0]), middles[0], column) for column in gain.reshape(rows, -1).T]
     steady = np.stack(down, axis=1).reshape(shape[0], cols, -1)

@@ -16,7 +16,7 @@ from psvideo.model.arrays import Doubles, Image
 from psvideo.model.rows.ripple import Ripple
 from psvideo.plates.ambient.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient.ambient_change import AmbientChange
-from psvideo.plates.ambient.ambient_kernel import average_rows, measure_rows
+from psvideo.plates.ambient.ambient_kernel import AveragedDarks, OneMore, average_rows, measure_rows
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.ambient.mains import Mains, RowLight
 from psvideo.plates.split import Plate
@@ -113,15 +113,13 @@ def _blended(
     spans then."""
     shape = dark.picture.shape
     level, coarse, slots = AmbientLevel.room(shape), np.empty_like(ambient.coarse), np.empty_like(ambient.slots)
-    bound, block, old, new = dark.picture.bound(), block_px(shape), ambient.level.planes, level.planes
-    factors, seen = factor.astype(np.float32), np.ascontiguousarray(dark.seen)
-    gains = gain.reshape(len(gain), -1)
+    bound, block = dark.picture.bound(), block_px(shape)
+    old, new = AveragedDarks(*ambient.level.planes, ambient.slots), AveragedDarks(*level.planes, slots)
+    seen, gains = np.ascontiguousarray(dark.seen), gain.reshape(len(gain), -1)
+    one = OneMore(factor=factor.astype(np.float32), seen=seen, restarts=restarts, gain=gains)
 
     def blend(first: int, last: int) -> None:
-        bound.run(
-            average_rows, range(first, last), block, LONGEST_MEMORY, factors, seen, restarts, gains, old, ambient.slots,
-            first, last, new, slots, coarse,
-        )  # fmt: skip
+        bound.run(average_rows, range(first, last), block, LONGEST_MEMORY, one, old, first, last, new, coarse)
 
     over_bands(blend, shape)
     return level, coarse, slots

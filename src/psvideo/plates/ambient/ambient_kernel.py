@@ -3,6 +3,8 @@
 A row stays in a core's first cache meanwhile; no picture is held except the average.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from psvideo.compute.compiled import FUSED, REORDERED
@@ -12,9 +14,28 @@ from psvideo.plates.ambient.ambient_level import pack_row, unpack_row
 from psvideo.plates.mixing.mixing_kernel import mix_row
 from psvideo.plates.mixing.mixture_arrays import MixtureArrays, lent_mix
 
-Planes = tuple[Codes16, Floats, Floats, Floats]
-"""Of an AmbientLevel."""
 ONE, HALF = np.float32(1), np.float32(0.5)
+
+
+class AveragedDarks(NamedTuple):
+    """The average of dark slots: an AmbientLevel's planes, and how many slots it spans, ``slots`` (row, block)."""
+
+    codes: Codes16
+    least: Floats
+    step: Floats
+    narrow: Floats
+    slots: Floats
+
+
+class OneMore(NamedTuple):
+    """What is known of one more dark slot beside its picture: its rows' ``factor`` (row,), which of them are ``seen``
+    (row,), where the average begins again, ``restarts`` (row, block), and by how much the light has changed since,
+    ``gain`` (row, col and channel) of blocks, steadily between their middles."""
+
+    factor: Floats
+    seen: Flags
+    restarts: Flags
+    gain: Floats
 
 
 @FUSED.kept
@@ -35,18 +56,18 @@ def measure_rows(
 
 @FUSED.kept
 def average_rows(
-    mix: MixtureArrays, block: int, longest: float, factor: Floats, seen: Flags, restarts: Flags, gain: Floats,
-    old: Planes, old_slots: Floats, first: int, last: int, new: Planes, slots: Floats, coarse: Floats,
+    mix: MixtureArrays, block: int, longest: float, one: OneMore, old: AveragedDarks, first: int, last: int,
+    new: AveragedDarks, coarse: Floats,
 ) -> None:  # fmt: skip
-    """Average some rows of the light before, ``old``, brought to a new level, with one more picture, ``mix`` times
-    ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
+    """Average some rows of the light before, ``old``, brought to a new level, with one more picture, ``mix`` times its
+    factor; keep what was where nothing is seen.
 
-    gain: (row, col and channel) of blocks, the new level, which changes steadily between their middles. old_slots,
-    restarts: (row, block), how many pictures the average spans, ``longest`` at most, and where it begins again. Filled
-    are ``new`` and ``slots`` like the old ones, and ``coarse`` (row, col, channel) with the means over blocks.
+    The average spans ``longest`` pictures at most. Filled are ``new`` like the old one, and ``coarse`` (row, col,
+    channel) with the means over blocks.
     """
-    given, levels, found = lent_mix(mix), lent(gain), lent(coarse)
-    codes, least, step, narrow = lent(new[0]), lent(new[1]), lent(new[2]), lent(new[3])
+    given, levels, found = lent_mix(mix), lent(one.gain), lent(coarse)
+    factor, seen, restarts, old_slots, slots = one.factor, one.seen, one.restarts, old.slots, new.slots
+    codes, least, step, narrow = lent(new.codes), lent(new.least), lent(new.step), lent(new.narrow)
     samples, channels = given.samples, found.shape[2]
     cols = samples // channels
     line, total, then = np.empty(samples, np.float32), np.zeros(samples, np.float32), np.empty(samples, np.float32)
@@ -72,10 +93,10 @@ def average_rows(
                 _across(levels[min(upper + 1, levels.shape[0] - 1)], left, right, way, below)
                 held = upper
             mix_row(given, row, line)
-            packed = lent(old[0][row]), old[1][row], old[2][row]
+            packed = lent(old.codes[row]), old.least[row], old.step[row]
             _blend(packed, above, below, part, line, factor[row], share[0], shares, alike, then)
         else:
-            unpack_row(old[0][row], old[1][row], old[2][row], then)
+            unpack_row(old.codes[row], old.least[row], old.step[row], then)
             for place in range(len(share)):
                 slots[row, place] = old_slots[row, place]
         pack_row(then, codes[row], least, step, narrow[row], row, channels)
