@@ -23,7 +23,8 @@ from psvideo.solve.normals.least_squares.kernel import solve_rows
 from psvideo.solve.normals.least_squares.woodham1980 import solve
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.loops.blocks import working_memory
-from psvideo.solve.normals.task import Usable, empty_result, task
+from psvideo.solve.normals.result import empty_result
+from psvideo.solve.normals.task import Usable, task
 
 ROWS, COLS = 1080, 1920
 PIXELS = ROWS * COLS

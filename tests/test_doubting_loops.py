@@ -9,7 +9,7 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import View
-from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.evidence import Evidence, Indirect, Left
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Usable, task
@@ -258,7 +258,8 @@ def test_light_in_shadow_is_summed_up_as_plain_numpy_does(channels: int, step: i
     )  # fmt: skip
     n, a = (np.ascontiguousarray(np.moveaxis(each, -1, 0)) for each in (normals, albedo))
     sums, counts, wider, left, showing = (np.zeros((-(-23 // step), -(-1003 // step)), np.float32) for _ in range(5))
-    indirect_rows(given, working_memory(given), n, a, sums, counts, wider, left, showing, np.float32(soft), 0, 23, step)
+    light, rest = Indirect(sums, counts, wider), Left(left, showing)
+    indirect_rows(given, working_memory(given), n, a, light, rest, np.float32(soft), 0, 23, step)
 
     here = (plates < 0.8).all(axis=-1) & (True if shown is None else shown)
     size, level = albedo.mean(axis=-1), plates.mean(axis=-1)

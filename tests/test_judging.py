@@ -17,9 +17,10 @@ from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
+from psvideo.solve.normals.result import empty_result
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.surface_bits import stored
-from psvideo.solve.normals.task import Task, Usable, Work, empty_result
+from psvideo.solve.normals.task import Task, Usable, Work
 from psvideo.solve.normals.trust.doubting import doubt_deg
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import judged as judged_by_signs

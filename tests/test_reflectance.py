@@ -27,7 +27,7 @@ from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_kernel import fill_roughness_in_the_fit
-from psvideo.solve.normals.robust.reflecting import _rough as rough_in_loops
+from psvideo.solve.normals.robust.reflected_light import _rough as rough_in_loops
 from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable

@@ -1,5 +1,7 @@
 """Short names for numpy arrays, by what they hold. Shapes stand in the docstrings of the functions."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,8 @@ Codes8 = NDArray[np.uint8]
 """Brightness in the codes of eight bits."""
 Codes16 = NDArray[np.uint16]
 """Brightness in the codes of sixteen bits, as cameras and movies store it."""
+Samples = NDArray[Any]
+"""Numbers of float32, or half floats as the bits of uint16; of plates, also codes of uint16."""
 Image = NDArray[np.float32]
 """A picture, linear: (rows, columns) or (rows, columns, channels)."""
 Mask = NDArray[np.bool_]

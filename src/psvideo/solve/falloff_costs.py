@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Samples
 from psvideo.model.channels import mean_of_channels
 from psvideo.model.irradiance.ground import Ground, every_ray
 from psvideo.model.irradiance.near_light import near_field
@@ -12,7 +13,6 @@ from psvideo.model.rig import Light
 from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.plate_noise import LEAST
-from psvideo.solve.normals.task import Samples
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 LEAST_LIT = 4

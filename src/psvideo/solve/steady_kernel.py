@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
-from psvideo.model.arrays import Bytes, Floats
+from psvideo.model.arrays import Bytes, Floats, Samples
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
-from psvideo.solve.normals.task import Samples
 from psvideo.solve.steady_votes import (
     ADDS,
     FORGETS,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, thin
-from psvideo.model.arrays import Bytes, Floats, Mask
+from psvideo.model.arrays import Bytes, Floats, Mask, Samples
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.bucket_queue import queue_for
 from psvideo.solve.filling.growing import grow
@@ -15,7 +15,7 @@ from psvideo.solve.filling.looking import KEPT, MOST_COUNTED, Said, look_rows, m
 from psvideo.solve.filling.neighbours import REACH_PX
 from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Samples, Task, Work
+from psvideo.solve.normals.task import Task, Work
 from psvideo.solve.normals.trust.thin_surface import blurred
 
 MOST_LIGHTS_AROUND = 5

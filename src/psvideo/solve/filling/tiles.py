@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.arrays import Bytes, Mask
-from psvideo.solve.normals.task import Samples
+from psvideo.model.arrays import Bytes, Mask, Samples
 
 SHIFT = 5
 SIDE_PX = 1 << SHIFT

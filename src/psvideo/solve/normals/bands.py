@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Image, Mask
+from psvideo.model.arrays import Image, Mask, Samples
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.mixing.several_pictures import MakeRows, rows_maker
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Result, Samples, Task
+from psvideo.solve.normals.result import Result
+from psvideo.solve.normals.task import Task
 
 Memory = TypeVar("Memory")
 

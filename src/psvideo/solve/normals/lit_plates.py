@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 
-from psvideo.model.arrays import Floats, Mask
+from psvideo.model.arrays import Floats, Mask, Samples
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Samples
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
-from psvideo.model.arrays import Doubles
+from psvideo.model.arrays import Doubles, Samples
 from psvideo.plates.mixing.mixture import Mixture
-from psvideo.solve.normals.task import Samples
 
 APART_PX = 4
 """Demosaicing and filters make neighbours alike: over less than this. It is even, for mosaics repeat after two."""

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, rising_parts
-from psvideo.model.arrays import Doubles
+from psvideo.model.arrays import Doubles, Samples
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.noise_samples import Differences, noise_samples
-from psvideo.solve.normals.task import Samples
 
 LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""

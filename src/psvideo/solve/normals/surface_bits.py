@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.arrays import Samples
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.task import Samples
 
 
 def stored(surface: Surface) -> tuple[Samples, Samples]:

@@ -1,30 +1,23 @@
-"""What the compiled least-squares kernel is given: lights and samples as plain arrays, and where the solution goes."""
+"""What the compiled solvers are given: lights and samples as plain arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go, lie_in_files, planes_for
-from psvideo.model.arrays import Bytes, Doubles, Floats, Mask
+from psvideo.model.arrays import Bytes, Doubles, Floats, Mask, Samples
 from psvideo.model.rows.clipping import ROUNDING
 from psvideo.model.surface import Reflectance
 from psvideo.solve.depth.view import View
 from psvideo.solve.normals.illumination import Illumination
-
-Samples = NDArray[Any]  # of float32 or uint16
+from psvideo.solve.normals.result import Result
 
 PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
 
 FEW = 9
 """Up to this many distant lights a pixel's measurements stay in registers (``few_lights.py``)."""
-
-BROAD, MIDDLE, NARROW = 8, 32, 128
-"""The powers of the cosine that are a subject's highlights (``reflectance.py``)."""
 
 LIGHTS = np.float32(0.003)
 """Lights and lenses are never known better than this share of the signal."""
@@ -93,62 +86,6 @@ class Task(NamedTuple):
     albedo_scale: np.float32
     seen: Bytes  # (light, row, col or 1), or empty
     mask: Bytes  # (row, col), or empty
-
-
-class Result(NamedTuple):
-    """Where the solution goes: planes of float32, or of half floats as the bits of uint16."""
-
-    normals: Samples  # (3, pixel)
-    albedo: Samples  # (channel, pixel)
-    valid: Bytes  # (pixel,)
-    residual: Samples  # (pixel,), or empty
-
-
-class Weights(NamedTuple):
-    """How measurements are weighed, and which normals are trusted; ``weighing.Reweighting`` describes the fields.
-
-    ``most_error_deg`` is the limit for this picture, and ``common`` the share of a pixel's light that its lights
-    usually leave unexplained.
-    """
-
-    rounds: int
-    tukey: bool
-    width: np.float32
-    noise: np.float32
-    least: np.float32  # the same where residuals predict errors
-    signal_noise: np.float32
-    darkest: np.float32
-    brightest: np.float32
-    contradiction: np.float32
-    most_error_deg: np.float32
-    common: np.float32
-    curve: np.float32  # what the subject reflects beyond n . l: the numbers of reflectance.Reflectance, in g's unit
-    rough: np.float32
-    soft: np.float32
-    broad: np.float32
-    middle: np.float32
-    narrow: np.float32
-
-
-class Spread(NamedTuple):
-    """How noise spreads into normals under all lights.
-
-    shares: (channel,), by how much channels count beside the surface's own colour, as shares of white light's.
-    inverse: (3, 3), of the lights' normal equations. scale: degrees that hold a share of errors, per radian.
-    variances: of a dark sample, per unit of albedo, of its square; the last instead of that for what residuals say.
-    toward: (3,), the lights' mean direction by their strengths: what a normal has along it is the mean light there, as
-        a share of what would shine straight on it.
-    dim, wider: of near lights, at the points of a grid: irradiance over that in the middle, and by how much more noise
-        spreads there for the lights' directions; empty for distant lights.
-    """
-
-    shares: Floats
-    inverse: Floats
-    variances: Floats
-    scale: np.float32
-    toward: Floats
-    dim: Floats
-    wider: Floats
 
 
 class Work(NamedTuple):
@@ -240,26 +177,6 @@ def _pinhole(view: View, rows: int, cols: int) -> Floats:
     if view.focal_px is None:
         return np.empty(0, np.float32)
     return np.array([1 / view.focal_px[0], 1 / view.focal_px[1], *view.middle_px(rows, cols)], np.float32)
-
-
-def empty_result(pixels: int, channels: int, *, half: bool, residual: bool, spare: Path | None = None) -> Result:
-    """Return memory for the solution of this many pixels; of large pictures files in the folder ``spare``."""
-    stored = np.uint16 if half else np.float32
-    room = partial(planes_for, kind=stored, pixels=pixels, folder=spare)
-    return Result(
-        normals=room((3, pixels)),
-        albedo=room((channels, pixels)),
-        valid=np.empty(pixels, np.uint8),
-        residual=room((pixels if residual else 0,)),
-    )
-
-
-def let_rows_go(result: Result, cols: int, first: int, last: int) -> None:
-    """Hand rows of a solution that lies in files back to the system."""
-    if not lie_in_files(result.normals):  # as the other planes, which empty_result made alike
-        return
-    part = slice(first * cols, last * cols)
-    let_go(*(plane[part] for plane in (*result.normals, *result.albedo, result.residual)))
 
 
 def _filled(values: Doubles, copies: int, *, mode: Literal["constant", "edge"] = "constant") -> Floats:

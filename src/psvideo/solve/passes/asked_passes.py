@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Mask
+from psvideo.model.arrays import Mask, Samples
 from psvideo.model.surface import Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import noise_of
-from psvideo.solve.normals.task import Samples
 from psvideo.solve.passes.alpha_matte import soft_matte
 from psvideo.solve.passes.light_by_light import Explaining, reach_of, specular_of
 from psvideo.solve.passes.plate_rows import PlateRows

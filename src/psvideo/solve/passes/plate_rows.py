@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Floats, Mask
+from psvideo.model.arrays import Floats, Mask, Samples
 from psvideo.plates.mixing.mixture import Mixture, Reader, mixture_of
-from psvideo.solve.normals.task import Samples
 
 BAND_PIXELS = 1 << 15
 

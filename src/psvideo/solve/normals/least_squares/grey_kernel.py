@@ -6,10 +6,10 @@ One pseudo-inverse holds for all of them, and is applied to the samples as they 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Floats, Samples
 from psvideo.solve.normals.loops.blocks import HIGH, LOW, MISSING, SLIGHTLY_MORE, X, Y, Z
 from psvideo.solve.normals.loops.measuring import samples_of
-from psvideo.solve.normals.task import Samples, Task
+from psvideo.solve.normals.task import Task
 
 
 @FUSED.inlined

@@ -40,7 +40,8 @@ from psvideo.solve.normals.loops.colour_kernel import solve_colours
 from psvideo.solve.normals.loops.measuring import all_seen, any_asked, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light, place_lights
 from psvideo.solve.normals.loops.storing import store_block
-from psvideo.solve.normals.task import Result, Task, Work
+from psvideo.solve.normals.result import Result
+from psvideo.solve.normals.task import Task, Work
 
 COLOUR_STEP = 160  # pixels of three channels that are solved together: few enough to stay in the nearest cache
 

@@ -10,7 +10,8 @@ from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.loops.blocks import working_memory
-from psvideo.solve.normals.task import EVERYTHING, Looks, Task, Usable, Work, empty_result, let_rows_go, task
+from psvideo.solve.normals.result import empty_result, let_rows_go
+from psvideo.solve.normals.task import EVERYTHING, Looks, Task, Usable, Work, task
 
 __all__ = ["EVERYTHING", "Usable", "solve"]
 

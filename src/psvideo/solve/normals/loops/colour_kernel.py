@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, flattened
 from psvideo.compute.symmetric import adjugate
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Floats, Samples
 from psvideo.solve.normals.loops.blocks import (
     BLOCK,
     LOW,
@@ -31,7 +31,7 @@ from psvideo.solve.normals.loops.blocks import (
 )
 from psvideo.solve.normals.loops.measuring import samples_of, weigh_channels
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.task import Samples, Task
+from psvideo.solve.normals.task import Task
 
 TWO = np.float32(2)
 RX, RY, RZ, GX, GY, GZ, BX, BY, BZ = (SUMS + BLOCK * plane for plane in range(9))

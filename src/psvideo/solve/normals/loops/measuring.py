@@ -8,7 +8,7 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened, pointer
-from psvideo.model.arrays import Bytes, Floats
+from psvideo.model.arrays import Bytes, Floats, Samples
 from psvideo.solve.normals.loops.blocks import (
     ABSENT,
     BLOCK,
@@ -25,7 +25,7 @@ from psvideo.solve.normals.loops.blocks import (
     ZZ,
 )
 from psvideo.solve.normals.loops.near_kernel import at, place_lights
-from psvideo.solve.normals.task import Samples, Task
+from psvideo.solve.normals.task import Task
 
 
 @FUSED.inlined

@@ -17,10 +17,10 @@ from psvideo.compute.memory import lent
 from psvideo.compute.parts import INLINED
 from psvideo.model.arrays import Floats
 from psvideo.model.irradiance import near_light
+from psvideo.solve.normals.loops.blocks import ONE, X, Y, Z
 from psvideo.solve.normals.task import Near, Task
 
 LEAST_COSINE = np.float32(near_light.LEAST_COSINE)
-ONE = np.float32(1)
 
 
 @FUSED.inlined
@@ -114,3 +114,10 @@ def _at(numbers: Any, pixel: Any) -> Callable[[Any, int], Any]:
 def of_light(matrix: Any, light: int) -> Any:
     """One light's three numbers: the same for all pixels (matrix (light, 3)), or planes ((light, 3, pixel))."""
     return matrix[light, 0], matrix[light, 1], matrix[light, 2]
+
+
+@FUSED.inlined
+def shown(lamp: Any, w: Floats, pixel: int) -> Any:
+    """What a pixel's g, or normal, in the planes X, Y, Z shows under what ``of_light`` returned."""
+    x, y, z = at(lamp, pixel)
+    return x * w[X + pixel] + y * w[Y + pixel] + z * w[Z + pixel]

@@ -4,11 +4,12 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded
-from psvideo.model.arrays import Bytes, Floats
+from psvideo.model.arrays import Bytes, Floats, Samples
 from psvideo.solve.normals.loops.blocks import ABSENT, ALBEDO, COUNT, LEAST_Z, ONE, SUM, XX, XY, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.colour_kernel import albedo_from_sums
-from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.task import Result, Samples, Task
+from psvideo.solve.normals.loops.near_kernel import of_light, shown
+from psvideo.solve.normals.result import Result
+from psvideo.solve.normals.task import Task
 
 
 @FUSED.called
@@ -68,9 +69,8 @@ def _sum_up(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: i
         lamp = of_light(task.matrix, light)
         plane = values[light * task.tone.shape[1] + channel]
         for i in range(n):
-            x, y, z = at(lamp, i)
             here = m[light, i] > ABSENT
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            shade = shown(lamp, w, i)
             shade = shade if here else ZERO
             w[SUM + i] += shade * plane[i] if here else ZERO
             w[COUNT + i] += shade * shade
@@ -84,9 +84,8 @@ def _sum_up_weighed(task: Task, w: Floats, values: Floats, m: Floats, weights: F
         lamp = of_light(task.matrix, light)
         plane = values[light * task.tone.shape[1] + channel]
         for i in range(n):
-            x, y, z = at(lamp, i)
             here = m[light, i] > ABSENT
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            shade = shown(lamp, w, i)
             counted = shade * weights[light, i] if here else ZERO
             w[SUM + i] += counted * plane[i] if here else ZERO
             w[COUNT + i] += counted * shade
@@ -111,10 +110,8 @@ def _store_residual(task: Task, w: Floats, m: Floats, n: int, out: Samples) -> N
         for channel in range(channels):
             to_plate += task.tone[light, channel, 3] / np.float32(channels)
         for i in range(n):
-            x, y, z = at(lamp, i)
             here = m[light, i] > ABSENT
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
-            error = (m[light, i] - w[ALBEDO + i] * shade) * to_plate
+            error = (m[light, i] - w[ALBEDO + i] * shown(lamp, w, i)) * to_plate
             w[XX + i] += error * error if here else ZERO
             w[XY + i] += ONE if here else ZERO
     for i in range(n):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, planes_for
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.model.arrays import Doubles, Floats, Mask, Samples
 from psvideo.model.surface import Metal, Surface
 from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
@@ -17,7 +17,7 @@ from psvideo.solve.normals.metal.lobe_fit import FARTHEST_DEG, directions
 from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance import points_at
 from psvideo.solve.normals.robust.subject_points import SubjectPoints
-from psvideo.solve.normals.task import Samples, Usable
+from psvideo.solve.normals.task import Usable
 
 MOST_LEFT = 0.5
 """A pixel is metal where metal leaves at most this share of what a matte one leaves: a machine has other parts too."""

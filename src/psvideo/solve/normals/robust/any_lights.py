@@ -5,7 +5,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
-from psvideo.solve.normals.loops.near_kernel import at, of_light
+from psvideo.solve.normals.loops.near_kernel import at, of_light, shown
 from psvideo.solve.normals.robust.equations import (
     FROM,
     HALF,
@@ -20,7 +20,8 @@ from psvideo.solve.normals.robust.equations import (
     halve,
 )
 from psvideo.solve.normals.robust.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN, median_few
-from psvideo.solve.normals.task import FEW, Task, Weights
+from psvideo.solve.normals.robust.weighing import Weights
+from psvideo.solve.normals.task import FEW, Task
 
 MANY = np.float32(FEW)  # usable measurements beyond which the weight narrows
 
@@ -72,8 +73,7 @@ def fill_residuals(matrix: Floats, w: Floats, m: Floats, e: Floats, n: int) -> N
     for light in range(len(e)):
         lamp, there, errors = of_light(matrix, light), m[light], e[light]
         for i in range(n):
-            x, y, z = at(lamp, i)
-            error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
+            error = abs(there[i] - shown(lamp, w, i))
             errors[i] = error if there[i] > ABSENT else OUT
 
 
@@ -92,8 +92,7 @@ def find_scale(
     for light in range(len(e)):
         lamp, there, errors = of_light(matrix, light), m[light], e[light]
         for i in range(n):
-            x, y, z = at(lamp, i)
-            error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
+            error = abs(there[i] - shown(lamp, w, i))
             errors[i] = error if there[i] > ABSENT else OUT
             v[TO + i] += error if there[i] > ABSENT else ZERO
     if len(e) == FEW:

@@ -1,54 +1,15 @@
 """Compiled part of the robust solver: some pixels of a block put side by side, from all blocks of a row, to be solved
 together."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Floats, Indices
-from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
-from psvideo.solve.normals.robust.equations import OUT, PLANES_OF_V, SENT, VIEW_X, VIEW_Y, VIEW_Z
-from psvideo.solve.normals.robust.reflecting import KEPT, OF_LIGHT
-from psvideo.solve.normals.task import Task
+from psvideo.solve.normals.loops.blocks import COUNT, LIMIT, X, Y, Z
+from psvideo.solve.normals.robust.equations import SENT, VIEW_X, VIEW_Y, VIEW_Z
+from psvideo.solve.normals.robust.room import Room
 
 WHOLE = 16  # pixels are filled up to whole vectors of this many: what is left over would be solved one by one
-
-
-class Room(NamedTuple):
-    """What a block of pixels is solved in; planes are BLOCK long."""
-
-    planes: Floats  # those of ``blocks.py``
-    more: Floats  # those of ``equations.py``
-    values: Floats  # (light * channel, pixel)
-    measurements: Floats  # (light, pixel): the channels combined
-    errors: Floats  # (light, pixel)
-    matrix: Floats  # (light, 3, pixel): what lights send to every pixel
-    per_strength: Floats  # (light, pixel)
-    ways: Floats  # (light, 6, pixel) where the subject's reflectance is known, else of no light
-    matte: Floats  # (light, pixel): measurements without highlights
-    kept: Floats  # what else ``reflecting.py`` keeps
-
-
-def memory_for_block(task: Task, *, reflecting: bool) -> Room:
-    """Return memory for one thread; ``reflecting`` where the subject's reflectance is known."""
-    lights, channels = task.tone.shape[:2]
-    values = np.full((lights * channels, BLOCK), MISSING, np.float32)
-    modelled = lights if reflecting else 0
-    more = np.ones(PLANES_OF_V * BLOCK, np.float32)
-    more[VIEW_X:VIEW_Z] = 0  # a lens that is known changes it with the block
-    return Room(
-        planes=np.zeros(PLANES * BLOCK, np.float32),
-        more=more,
-        values=values,
-        measurements=values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32),
-        errors=np.full((lights, BLOCK), OUT, np.float32),
-        matrix=np.repeat(task.matrix[..., None], BLOCK, axis=-1),  # near lights' change with the block
-        per_strength=np.repeat(task.per_strength[:, None], BLOCK, axis=-1),
-        ways=np.zeros((modelled, 6, BLOCK), np.float32),
-        matte=np.full((modelled, BLOCK), MISSING, np.float32),
-        kept=np.zeros(BLOCK * (KEPT + OF_LIGHT * lights) if reflecting else 0, np.float32),
-    )
 
 
 @FUSED.inlined

@@ -11,7 +11,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
-from psvideo.solve.normals.loops.near_kernel import at, of_light
+from psvideo.solve.normals.loops.near_kernel import at, of_light, shown
 from psvideo.solve.normals.robust.equations import (
     DOUBT,
     LOWER,
@@ -24,6 +24,7 @@ from psvideo.solve.normals.robust.equations import (
     add_equations,
     solve_equations,
 )
+from psvideo.solve.normals.robust.weighing import Weights
 from psvideo.solve.normals.task import Task
 
 TWO, FOUR = np.float32(2), np.float32(4)
@@ -32,17 +33,7 @@ BEST, SQUARES = LOWER, RANK  # planes of v that are free at this step
 
 
 @FUSED.called
-def drop_odd_of_four(
-    task: Task,
-    noise: np.float32,
-    signal_noise: np.float32,
-    contradiction: np.float32,
-    w: Floats,
-    v: Floats,
-    m: Floats,
-    e: Floats,
-    n: int,
-) -> None:
+def drop_odd_of_four(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Where four measurements remain and contradict each other, the likeliest highlight among them becomes MISSING.
 
     The residuals of least squares over four always stand in one ratio, whichever measurement is to blame. Highlights
@@ -50,7 +41,7 @@ def drop_odd_of_four(
     to the normal that the other three give. DOUBT is the root of the squared residuals there, else 0.
     """
     v[DOUBT : DOUBT + n] = ZERO
-    if not _some_contradict(task, noise, signal_noise, contradiction, w, v, m, e, n):
+    if not _some_contradict(task, weights, w, v, m, e, n):
         return
     for i in range(n):
         v[BEST + i], v[ODD + i] = -TWO, -ONE
@@ -77,17 +68,7 @@ def drop_odd_of_four(
 
 
 @FUSED.inlined
-def _some_contradict(
-    task: Task,
-    noise: np.float32,
-    signal_noise: np.float32,
-    contradiction: np.float32,
-    w: Floats,
-    v: Floats,
-    m: Floats,
-    e: Floats,
-    n: int,
-) -> bool:
+def _some_contradict(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> bool:
     """Whether any pixel of the block has four measurements that contradict each other; DOUBT is 1 where."""
     four = 0
     for i in range(n):
@@ -98,8 +79,8 @@ def _some_contradict(
     some = 0
     for i in range(n):
         light = v[SENT + i] * np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
-        sigma = noise + signal_noise * light
-        contradict = (w[COUNT + i] == FOUR) & (v[SQUARES + i] > (contradiction * sigma) ** 2)
+        sigma = weights.noise + weights.signal_noise * light
+        contradict = (w[COUNT + i] == FOUR) & (v[SQUARES + i] > (weights.contradiction * sigma) ** 2)
         v[DOUBT + i] = ONE if contradict else ZERO
         some += contradict
     return some > 0
@@ -112,8 +93,7 @@ def _find_errors(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int)
     for light in range(task.lights):
         lamp = of_light(task.matrix, light)
         for i in range(n):
-            x, y, z = at(lamp, i)
-            error = m[light, i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i])
+            error = m[light, i] - shown(lamp, w, i)
             error = error if m[light, i] > ABSENT else ZERO
             e[light, i] = error
             v[SQUARES + i] += error * error

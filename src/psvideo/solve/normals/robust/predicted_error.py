@@ -9,7 +9,7 @@ from psvideo.solve.normals.loops.blocks import COUNT, ONE, THREE, XX, XY, XZ, YY
 from psvideo.solve.normals.robust.equations import DOUBT, LOWER, SCALE, SENT
 from psvideo.solve.normals.robust.few_lights import EIGHT, FOUR
 from psvideo.solve.normals.robust.odd_of_four import TWO
-from psvideo.solve.normals.task import Weights
+from psvideo.solve.normals.robust.weighing import Weights
 
 SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much
 SUSPICION = np.float32(0.05)  # what a highlight among four that was left out still says against the other three

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.arrays import Doubles, Mask
+from psvideo.model.arrays import Doubles, Mask, Samples
 from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.plates.mixing.mixture import Mixture
@@ -15,7 +15,7 @@ from psvideo.solve.normals.noise_samples import rows_of
 from psvideo.solve.normals.robust.reflectance_fit import fitted
 from psvideo.solve.normals.robust.subject_points import LEAST_POINTS, SubjectPoints, joined
 from psvideo.solve.normals.robust.sure_of_motion import sure_of_motion
-from psvideo.solve.normals.task import Samples, Usable
+from psvideo.solve.normals.task import Usable
 
 LIGHTS_FOR_REFLECTANCE = 5
 ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800

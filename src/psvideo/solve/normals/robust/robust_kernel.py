@@ -9,20 +9,24 @@ from typing import NamedTuple
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.memory import encoded, lent
+from psvideo.compute.memory import lent
 from psvideo.model.arrays import Bytes, Floats, Indices
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, ONE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.colour_kernel import solve_colours
 from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usable
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, place_lights
 from psvideo.solve.normals.loops.storing import store_block
-from psvideo.solve.normals.robust.apart import Room, fill_up, memory_for_block, put_side_by_side
+from psvideo.solve.normals.result import Result, empty_result
+from psvideo.solve.normals.robust.apart import fill_up, put_side_by_side
 from psvideo.solve.normals.robust.equations import DOUBT, fill_sent, fill_view
 from psvideo.solve.normals.robust.explained import list_unexplained, solve_plainly
+from psvideo.solve.normals.robust.handing_out import hand_out
 from psvideo.solve.normals.robust.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
-from psvideo.solve.normals.robust.reflecting import find_ways
+from psvideo.solve.normals.robust.reflected_light import find_ways
 from psvideo.solve.normals.robust.robust_weights import solve_reweighted, weigh
-from psvideo.solve.normals.task import FEW, LIGHTS, Result, Task, Weights, empty_result
+from psvideo.solve.normals.robust.room import Room, memory_for_block
+from psvideo.solve.normals.robust.weighing import Weights
+from psvideo.solve.normals.task import FEW, LIGHTS, Task
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
 LEAST_CHECKED = 5  # usable measurements from which on residuals show how well the lights explain a pixel
@@ -51,16 +55,6 @@ def working_memory(task: Task, *, reflecting: bool, residual: bool) -> Memory:
     )
 
 
-def as_bytes(result: Result) -> Result:
-    """Return a result as ``solve_rows`` takes it."""
-    return Result(
-        normals=result.normals.view(np.uint8),
-        albedo=result.albedo.view(np.uint8),
-        valid=result.valid,
-        residual=result.residual.view(np.uint8),
-    )
-
-
 @FUSED.kept
 def solve_rows(
     task: Task, result: Result, half: bool, error: Bytes, misfit: Floats, memory: Memory, weights: Weights,
@@ -85,7 +79,7 @@ def solve_rows(
     sent, per = lent(task.matrix), lent(task.per_strength)
     distant, lens = t.near.depth.size == 0, t.near.pinhole.size > 0
     for room in (whole, apart):
-        find_ways(room.matrix, room.per_strength, room.more, room.ways, BLOCK)  # through a lens they change
+        find_ways(room, BLOCK)  # through a lens they change
     places = lent(memory.places)
     for row in range(-(-first // step) * step, last, step):
         waiting = 0
@@ -105,13 +99,13 @@ def solve_rows(
             store_block(t, block, w, values, m, e, 0, n, summed, weighed)
             for i in range(n):
                 listed[i] = start + i
-            _hand_out(block, v, out, predicted, unexplained, half, listed, n)
+            hand_out(block, v, out, predicted, unexplained, half, listed, n)
             if waiting and (waiting >= STEP or col + STEP >= t.cols):
                 n = fill_up(apart, waiting, distant, lens, listed)
                 _solve_apart(t_apart, sent, per, weights, apart, n)
                 values, m, e = apart.values, apart.measurements, apart.errors
                 store_block(t_apart, block, apart.planes, values, m, e, 0, n, False, True)
-                _hand_out(block, apart.more, out, predicted, unexplained, half, places, waiting)
+                hand_out(block, apart.more, out, predicted, unexplained, half, places, waiting)
                 waiting = 0
 
 
@@ -121,44 +115,6 @@ def _lent_room(room: Room) -> Room:
         lent(room.planes), lent(room.more), lent(room.values), lent(room.measurements), lent(room.errors),
         lent(room.matrix), lent(room.per_strength), lent(room.ways), lent(room.matte), lent(room.kept),
     )  # fmt: skip
-
-
-@FUSED.called
-def _hand_out(
-    block: Result, v: Floats, out: Result, predicted: Bytes, unexplained: Floats, half: bool, places: Indices, n: int
-) -> None:
-    """Write solved pixels where they go."""
-    for i in range(n):
-        v[DOUBT + i] = v[DOUBT + i] if block.valid[i] else ZERO
-    for i in range(min(n, len(unexplained))):
-        unexplained[places[i]] = v[UNEXPLAINED + i] if block.valid[i] else ZERO
-    for axis in range(3):
-        _write(block.normals[axis], out.normals[axis], half, places, n)
-    for channel in range(len(block.albedo)):
-        _write(block.albedo[channel], out.albedo[channel], half, places, n)
-    if out.residual.size:
-        _write(block.residual, out.residual, half, places, n)
-    if predicted.size:
-        _write(v[DOUBT : DOUBT + n], predicted, half, places, n)
-    for i in range(n):
-        out.valid[places[i]] = block.valid[i]
-
-
-@FUSED.called
-def _write(values: Floats, plane: Bytes, half: bool, places: Indices, n: int) -> None:
-    start, side_by_side = places[0], places[n - 1] - places[0] == n - 1
-    if half and side_by_side:
-        halves = plane.view(np.uint16)[start : start + n]
-        for i in range(n):
-            halves[i] = encoded(values[i], halves)
-    elif half:
-        halves = plane.view(np.uint16)
-        for i in range(n):
-            halves[places[i]] = encoded(values[i], halves)
-    else:
-        floats = plane.view(np.float32)
-        for i in range(n):
-            floats[places[i]] = values[i]
 
 
 @FUSED.inlined
@@ -233,7 +189,7 @@ def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) 
         fill_sent(task.per_strength, task.lights, room.more, n)
     if task.near.pinhole.size:
         fill_view(task.near.pinhole, row, col, room.more, n)
-        find_ways(task.matrix, task.per_strength, room.more, room.ways, n)
+        find_ways(room, n)
     plain = distant and task.tone.shape[1] == 3 and all_seen(task.seen, row, col, n)
     summed = plain and solve_colours(task, w, values, m, row * task.cols + col, n)
     if summed:

@@ -9,12 +9,13 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.robust.any_lights import add_start, add_weighted, choose_start, fill_weights, find_scale
-from psvideo.solve.normals.robust.apart import Room
 from psvideo.solve.normals.robust.equations import solve_equations
 from psvideo.solve.normals.robust.few_lights import begin_few, reweigh_few
 from psvideo.solve.normals.robust.odd_of_four import TWO, drop_odd_of_four
 from psvideo.solve.normals.robust.reflecting import reflect, weigh_reflecting
-from psvideo.solve.normals.task import Task, Weights
+from psvideo.solve.normals.robust.room import Room
+from psvideo.solve.normals.robust.weighing import Weights
+from psvideo.solve.normals.task import Task
 
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
 
@@ -32,7 +33,7 @@ def solve_reweighted(task: Task, sent: Floats, per: Floats, weights: Weights, ro
         choose_start(task, weights, w, v, m, e, n)
         add_start(task, w, v, m, e, n)
     solve_equations(w, n, SOUND_SQUARED, False)
-    drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
+    drop_odd_of_four(task, weights, w, v, m, e, n)
     for _ in range(weights.rounds):
         _reweigh(task, sent, weights.noise, weights.signal_noise, weights.tukey, weights.width, False, few, room, n)
         solve_equations(w, n, SOUND_SQUARED, True)
@@ -48,9 +49,8 @@ def weigh(
     share: of a pixel's light, what is left over at least.
     """
     if modelled:
-        w, v, m, e, kept, matte = room.planes, room.more, room.measurements, room.errors, room.kept, room.matte
-        reflect(task.matrix, room.ways, task.lights, weights, kept, matte, w, v, m, e, n)
-        weigh_reflecting(room.ways, task.lights, weights, share, kept, matte, w, v, room.values, m, e, n)
+        reflect(room, task.lights, weights, n)
+        weigh_reflecting(room, task.lights, weights, share, n)
     else:
         _reweigh(task, sent, weights.least, share, False, TWO, True, few, room, n)
         if few:

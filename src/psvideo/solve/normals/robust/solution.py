@@ -5,25 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.arrays import Doubles, Floats
+from psvideo.model.arrays import Doubles, Floats, Samples
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.asked_surface import AskedSurface
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.light_sigmas import root_sigmas, with_noise
 from psvideo.solve.normals.lit_plates import LitPlates
-from psvideo.solve.normals.task import (
-    FEW,
-    Looks,
-    Result,
-    Samples,
-    Task,
-    Usable,
-    Weights,
-    Work,
-    empty_result,
-    let_rows_go,
-    task,
-)
+from psvideo.solve.normals.result import Result, empty_result, let_rows_go
+from psvideo.solve.normals.robust.weighing import Weights
+from psvideo.solve.normals.task import FEW, Looks, Task, Usable, Work, task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,9 +77,10 @@ class Solution:
         """Solve every ``step``-th row. ``error`` asks for predicted errors; ``unexplained`` (pixel,) takes the share of
         its light that each pixel's lights leave unexplained. ``looks`` looks at each band while it is in memory."""
         from psvideo.solve.normals.robust import robust_kernel as kernel
+        from psvideo.solve.normals.robust.handing_out import as_bytes
 
         cols, result, predicted = self.shown.shape[1], self.result, self.predicted
-        into = (predicted if error else predicted[:0]).view(np.uint8)
+        out, into = as_bytes(result), (predicted if error else predicted[:0]).view(np.uint8)
         left = np.zeros(0, np.float32) if unexplained is None else unexplained
 
         def memory(one: Task) -> tuple[kernel.Memory, Work | None]:
@@ -98,7 +89,7 @@ class Solution:
 
         def band(one: Task, room: tuple[kernel.Memory, Work | None], first: int, last: int) -> None:
             own, beside = room
-            kernel.solve_rows(one, kernel.as_bytes(result), self.asked.half, into, left, own, how, first, last, step)
+            kernel.solve_rows(one, out, self.asked.half, into, left, own, how, first, last, step)
             if looks is not None and beside is not None:
                 looks.look(one, result, beside, first, last)
             let_rows_go(result, cols, first, last)

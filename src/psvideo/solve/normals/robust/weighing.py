@@ -1,22 +1,21 @@
 """How the robust solver weighs measurements, and up to which predicted error its normals are valid."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from psvideo.model.surface import Misfit, Reflectance
-from psvideo.solve.normals.task import Weights
 
 MOST_TYPICAL_DEG = 30.0
 """However bad a picture is as a whole, beyond this no normal is valid."""
 EVERYTHING_DEG = 179.0
 TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: this wide, Tukey's keeps 95 % of what Gaussian noise holds
-
-
 LEAST_CLAIMED = 0.3
 """Where the noise is known, residuals predict no less than this much of a dark measurement's: noise is counted beside
 them, and what lies in a dark part of the picture was said to be off by what cameras are thought to have at least."""
+BROAD, MIDDLE, NARROW = 8, 32, 128
+"""The powers of the cosine that are a subject's highlights (``model.surface.Reflectance``)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +45,32 @@ class Reweighting:
     contradiction: float = 3.0
     most_error_deg: float = 6.0
     beside_typical: float = 2.5
+
+
+class Weights(NamedTuple):
+    """How measurements are weighed, and which normals are trusted; ``Reweighting`` describes the fields.
+
+    ``most_error_deg`` is the limit for this picture, and ``common`` the share of a pixel's light that its lights
+    usually leave unexplained.
+    """
+
+    rounds: int
+    tukey: bool
+    width: np.float32
+    noise: np.float32
+    least: np.float32  # the same where residuals predict errors
+    signal_noise: np.float32
+    darkest: np.float32
+    brightest: np.float32
+    contradiction: np.float32
+    most_error_deg: np.float32
+    common: np.float32
+    curve: np.float32  # what the subject reflects beyond n . l: the numbers of surface.Reflectance, in g's unit
+    rough: np.float32
+    soft: np.float32
+    broad: np.float32
+    middle: np.float32
+    narrow: np.float32
 
 
 def limit_deg(reweighting: Reweighting, misfit: Misfit | None) -> float:

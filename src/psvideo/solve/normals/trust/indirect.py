@@ -13,7 +13,8 @@ from psvideo.solve.normals.evidence import Evidence, Indirect, Left
 from psvideo.solve.normals.light_sigmas import combined_noise, with_noise
 from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.task import Result, Task, Work, task
+from psvideo.solve.normals.result import Result
+from psvideo.solve.normals.task import Task, Work, task
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 
 OF_MOTION = np.float32(2)
@@ -60,9 +61,8 @@ class IndirectLook:
         shape = (-1, self.rows, self.given.cols)
         planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)
         given = self.given._replace(plates=shown.plates[: len(self.given.plates)], like=shown.like)
-        indirect_rows(
-            given, work, planes, albedo, *self.found, *self.left, np.float32(self.soft), first, last, self.step
-        )
+        soft = np.float32(self.soft)
+        indirect_rows(given, work, planes, albedo, self.found, self.left, soft, first, last, self.step)
 
 
 def not_of_motion(points: ThinSurface, one: Evidence, sums: Floats) -> Floats:

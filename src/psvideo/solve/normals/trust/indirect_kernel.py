@@ -8,11 +8,12 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, lent
 from psvideo.compute.symmetric import adjugate
-from psvideo.model.arrays import Floats
+from psvideo.model.arrays import Floats, Samples
+from psvideo.solve.normals.evidence import Indirect, Left
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, ZERO
 from psvideo.solve.normals.loops.measuring import is_seen, samples_of
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light, place_lights
-from psvideo.solve.normals.task import LIGHTS, Samples, Task, Work
+from psvideo.solve.normals.task import LIGHTS, Task, Work
 
 TWO = np.float32(2)
 FACING = np.float32(0.05)  # the cosine up to which a light passes a surface by, where such light was not used
@@ -32,19 +33,20 @@ PICKED = 22 * BLOCK  # samples that lie apart in a row, side by side
 
 @FUSED.kept
 def indirect_rows(
-    task: Task, work: Work, normals: Samples, albedo: Samples, sums: Floats, counts: Floats, wider: Floats,
-    squares: Floats, lights: Floats, soft: np.float32, first: int, last: int, step: int,
+    task: Task, work: Work, normals: Samples, albedo: Samples, found: Indirect, left: Left, soft: np.float32,
+    first: int, last: int, step: int,
 ) -> None:  # fmt: skip
-    """Add up what reaches every ``step``-th row and column from lights that do not, as a share of the albedo, by how
-    much farther noise spreads without these (``wider``), and the ``squares`` of what normals leave of all ``lights``
-    that show there, where these planes are not empty.
+    """Fill ``found`` with what reaches every ``step``-th row and column from lights that do not, and by how much
+    farther noise spreads without these; and ``left`` with what normals leave of all lights that show there, where its
+    planes are not empty.
 
-    normals, albedo: (3, row, col) and (channel, row, col), zeros where there is none. The others: (row // step,
-    col // step). ``soft``: what the subject lets through counts as the lights' own.
+    normals, albedo: (3, row, col) and (channel, row, col), zeros where there is none. Planes of ``found`` and ``left``:
+    (row // step, col // step). ``soft``: what the subject lets through counts as the lights' own.
     """
     t = lent_task(task, work.matrix, work.per_strength)
     n, a, w = lent(normals), lent(albedo), lent(work.planes)
-    total, count, spreads, over, lit = lent(sums), lent(counts), lent(wider), lent(squares), lent(lights)
+    total, count, wider = lent(found.sums), lent(found.counts), lent(found.wider)
+    squares, lights = lent(left.squares), lent(left.lights)
     for row in range(-(-first // step) * step, last, step):
         for col in range(0, t.cols, BLOCK):
             width = min(BLOCK, t.cols - col)
@@ -61,11 +63,11 @@ def indirect_rows(
                 w[PICKED + point] = _widened(w, point)
             _keep_known(w, TOTAL, points, total[down, place : place + points])
             _keep_known(w, NUMBER, points, count[down, place : place + points])
-            _keep_known(w, PICKED, points, spreads[down, place : place + points])
+            _keep_known(w, PICKED, points, wider[down, place : place + points])
             for point in range(points if squares.size else 0):
                 if w[SIZE + point] > ZERO:
-                    over[down, place + point] = w[LEFT + point]
-                    lit[down, place + point] = w[SHOWING + point]
+                    squares[down, place + point] = w[LEFT + point]
+                    lights[down, place + point] = w[SHOWING + point]
 
 
 @FUSED.inlined

@@ -4,9 +4,9 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
-from psvideo.model.arrays import Bytes, Floats, Indices
+from psvideo.model.arrays import Bytes, Floats, Indices, Samples
 from psvideo.solve.normals.loops.blocks import ONE, TINY, ZERO
-from psvideo.solve.normals.task import Samples, Spread
+from psvideo.solve.normals.trust.spread_numbers import Spread
 
 TWO, MOST_FIT_DEG, LARGEST_DEG = np.float32(2), np.float32(60), np.float32(180)
 LEAST_LEVEL = np.float32(0.25)  # of the light that shines straight on a surface, what is counted for noise at least

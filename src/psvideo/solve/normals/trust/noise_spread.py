@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 from psvideo.compute.ranks import median
 from psvideo.compute.spilled import let_go, lie_in_files, planes_for
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Floats, Mask
+from psvideo.model.arrays import Floats, Mask, Samples
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.light_sigmas import combined_noise, light_sigmas
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.surface_bits import bits, stored
-from psvideo.solve.normals.task import LIGHTS, Samples, Spread
+from psvideo.solve.normals.task import LIGHTS
 from psvideo.solve.normals.trust.near_spread import NearSpread
+from psvideo.solve.normals.trust.spread_numbers import Spread
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, brightness
 
 NOTHING, NO_DOUBT = np.zeros((0, 0), np.float32), np.zeros((2, 0, 0), np.float32)
