@@ -87,16 +87,15 @@ def test_noise_that_blocks_share_as_compression_makes_it_is_no_motion(motion: st
     assert flow.changed(sketches[0], sketches[1]).any() == moves
 
 
+def times(gain: float, one: Round) -> Round:
+    plates = (replace(plate, picture=mixture_of(plate.image * np.float32(gain))) for plate in one.plates)
+    return replace(one, plates=tuple(plates))
+
+
 @pytest.mark.parametrize("gain", [0.7, 1.02, 1.4])
 def test_an_exposure_that_changes_from_round_to_round_is_no_motion(gain: float) -> None:
     clip = filmed(3, "at rest", 0.004)
-    breathing = tuple(
-        replace(
-            one,
-            plates=tuple(replace(plate, picture=mixture_of(plate.image * np.float32(gain**n))) for plate in one.plates),
-        )
-        for n, one in enumerate(clip.rounds)
-    )
+    breathing = tuple(times(gain**n, one) for n, one in enumerate(clip.rounds))
     for given, shown in zip(breathing[1].plates, brought(clip, rounds=breathing)[1].plates, strict=True):
         assert shown.image is given.image
 
@@ -104,13 +103,7 @@ def test_an_exposure_that_changes_from_round_to_round_is_no_motion(gain: float) 
 @pytest.mark.parametrize("gain", [0.85, 1.2])
 def test_what_moves_while_the_exposure_changes_is_still_followed(gain: float) -> None:
     clip = filmed(3, "4 px", 0.004)
-    breathing = tuple(
-        replace(
-            one,
-            plates=tuple(replace(plate, picture=mixture_of(plate.image * np.float32(gain**n))) for plate in one.plates),
-        )
-        for n, one in enumerate(clip.rounds)
-    )
+    breathing = tuple(times(gain**n, one) for n, one in enumerate(clip.rounds))
     time_s = clip.rounds[1].plates[1].time_s
     said = [clip.error_deg(clip.solved(brought(clip, rounds=rounds)[1]), time_s) for rounds in (None, breathing)]
     (_, share), (error_deg, share_breathing) = said

@@ -71,27 +71,22 @@ def test_a_disk_that_turns_out_to_be_full_ends_the_keeping_and_not_the_run() -> 
         assert (len(kept), kept.missed) == (0, 2)
 
 
-def test_a_write_that_takes_only_a_part_is_gone_on_with(tmp_path: Path) -> None:
-    class Slow(io.FileIO):
-        def write(self, data: memoryview) -> int:  # type: ignore[override]
-            return super().write(data[:7])
-
-    codes = np.arange(100, dtype=np.uint16).reshape(10, 10)
-    with Slow(str(tmp_path / "file"), "w+") as file:
-        kept = Kept(file, most_bytes=10**6)
-        kept.put(3, picture(codes))
-        assert np.array_equal(kept.get(3).codes, codes)
+class SlowToWrite(io.FileIO):
+    def write(self, data: memoryview) -> int:  # type: ignore[override]
+        return super().write(data[:7])
 
 
-def test_a_reading_that_gives_only_a_part_is_gone_on_with(tmp_path: Path) -> None:
+class SlowToRead(io.FileIO):
     """Linux gives 2 GiB at a time."""
 
-    class Slow(io.FileIO):
-        def readinto(self, room: memoryview) -> int:  # type: ignore[override]
-            return super().readinto(room[:7]) or 0
+    def readinto(self, room: memoryview) -> int:  # type: ignore[override]
+        return super().readinto(room[:7]) or 0
 
+
+@pytest.mark.parametrize("slow", [SlowToWrite, SlowToRead])
+def test_a_write_or_a_reading_of_only_a_part_is_gone_on_with(slow: type[io.FileIO], tmp_path: Path) -> None:
     codes = np.arange(100, dtype=np.uint16).reshape(10, 10)
-    with Slow(str(tmp_path / "file"), "w+") as file:
+    with slow(str(tmp_path / "file"), "w+") as file:
         kept = Kept(file, most_bytes=10**6)
         kept.put(3, picture(codes))
         assert np.array_equal(kept.get(3).codes, codes)

@@ -230,12 +230,16 @@ def test_normals_that_sheen_turns_are_mostly_called_invalid() -> None:
     assert valid[:, :60].sum() > 0.97 * inside[:, :60].sum()
 
 
+def ball_that_stands() -> tuple[Plates, Illumination]:
+    """Plates of a ball under five lights, with a noise of 0.002."""
+    normals, _ = ball(reach_deg=60)
+    lit, rng = lit_by(ring(5, 40)), np.random.default_rng(9)
+    return [plate + rng.normal(0, 0.002, plate.shape).astype(np.float32) for plate in shoot(normals, lit)], lit
+
+
 def test_what_was_not_followed_does_not_spoil_what_stands_around_it() -> None:
     """Two thirds of the plates lie beside each other, and say that they may: the rest is judged as if alone."""
-    normals, _ = ball(reach_deg=60)
-    lit = lit_by(ring(5, 40))
-    rng = np.random.default_rng(9)
-    plates = [plate + rng.normal(0, 0.002, plate.shape).astype(np.float32) for plate in shoot(normals, lit)]
+    plates, lit = ball_that_stands()
     cols = plates[0].shape[1]
     moves = slice(0, 2 * cols // 3)
     passed = [plate.copy() for plate in plates]
@@ -259,10 +263,7 @@ def test_what_was_not_followed_does_not_spoil_what_stands_around_it() -> None:
 
 def test_what_moves_is_typical_of_a_picture_only_where_it_fits_better_than_what_stands() -> None:
     """Two thirds of the plates lie beside each other, though their plates of a round agree: followed a little off."""
-    normals, _ = ball(reach_deg=60)
-    lit = lit_by(ring(5, 40))
-    rng = np.random.default_rng(9)
-    plates = [plate + rng.normal(0, 0.002, plate.shape).astype(np.float32) for plate in shoot(normals, lit)]
+    plates, lit = ball_that_stands()
     cols = plates[0].shape[1]
     moves = np.zeros(plates[0].shape, np.bool_)
     moves[:, : 2 * cols // 3] = True

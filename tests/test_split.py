@@ -1,19 +1,16 @@
 """Rolling-flash reconstruction: plates against the virtual shoot's truth and a least-squares oracle."""
 
-import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import OpenEXR
 import pytest
 from memory_frame import MemoryFrame
-from picture_file import read_picture
+from other_simulator import flashes_told, plan_and_frames
 from true_timing import true_timing
 
-from psvideo.formats.plan_toml import read_plan
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.row_profiles import collect
 from psvideo.model.rows.shutter import frames_touched, row_weights
@@ -239,17 +236,12 @@ def test_algorithm_1_fails_where_the_readout_is_short_and_the_weights_do_not(mak
 @pytest.mark.parametrize("clip", ["plain", "ambient"])
 def test_the_clips_of_another_simulator_give_its_true_plates(clip: str, shared_data: Path) -> None:
     folder = shared_data / "clips" / clip
-    plan = read_plan(folder / "plan.toml")
-    black, white = plan.camera.encoding.black_level, plan.camera.encoding.white_level
-    assert black is not None
-    assert white is not None
-    files = sorted((folder / "frames").glob("*.png"))
-    codes = [read_picture(file, cv2.IMREAD_UNCHANGED)[..., ::-1].astype(np.float32) for file in files]
-    frames = [MemoryFrame(n, np.ascontiguousarray((code - black) / (white - black))) for n, code in enumerate(codes)]
+    plan, images = plan_and_frames(folder)
+    frames = [MemoryFrame(n, image) for n, image in enumerate(images)]
     timing = timing_from_rows(plan, *collect(frames))
     plates = list(split(iter(frames), plan.camera, timing))
     plates = list(without_ambient(plates))
-    truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
+    truth = flashes_told(folder)
     compared = 0
     for plate in plates:
         if "plate" in truth[plate.flash.index]:

@@ -1,6 +1,5 @@
 """The timing of a clip, found from its row profiles: against the virtual shoot's truth and another simulator's."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 from memory_frame import MemoryFrame
-from picture_file import read_picture
+from other_simulator import flashes_told, plan_and_frames
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.plan_toml import format_plan, read_plan
+from psvideo.formats.plan_toml import format_plan
 from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.row_profiles import collect
@@ -120,14 +119,10 @@ def test_the_flashes_listed_are_those_that_the_clip_saw_and_the_cut_ones_are_mar
 @pytest.mark.parametrize("clip", ["plain", "ambient"])
 def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_data: Path) -> None:
     folder = shared_data / "clips" / clip
-    plan = read_plan(folder / "plan.toml")
-    black, white = plan.camera.encoding.black_level, plan.camera.encoding.white_level
-    assert black is not None
-    assert white is not None
-    pictures = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((folder / "frames").glob("*.png"))]
-    profiles = np.array([(p.reshape(len(p), -1).mean(axis=1) - black) / (white - black) for p in pictures])
-    timing = timing_from_rows(plan, np.arange(len(pictures)), profiles, clip=clip)
-    truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
+    plan, images = plan_and_frames(folder)
+    profiles = np.array([image.mean(axis=(1, 2), dtype=np.float64) for image in images])
+    timing = timing_from_rows(plan, np.arange(len(images)), profiles, clip=clip)
+    truth = flashes_told(folder)
     assert [next(iter(flash.lights), None) for flash in timing.flashes] == [flash["light"] for flash in truth]
     assert [flash.complete for flash in timing.flashes] == [flash["complete"] for flash in truth]
     true_s = np.array([flash["start_s"] for flash in truth])

@@ -8,10 +8,12 @@ import pytest
 from disturbed_shots import COLUMNS, ROWS, PlanMaker, plates, rms_rows, shoot, timing_of
 from memory_frame import MemoryFrame
 
+from psvideo.model.arrays import Doubles
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rows.row_profiles import collect_with_doubt
+from psvideo.model.timing import Timing
 from psvideo.sync.find import timing_from_rows
-from psvideo.synth import Noise
+from psvideo.synth import Exposure, Noise
 
 
 @pytest.fixture
@@ -75,14 +77,19 @@ def test_rows_that_are_blurred_are_not_taken_for_tails(plan: Plan) -> None:
     assert rms_rows(timing, shot, plan) < 0.05
 
 
+def strayed_s(timing: Timing, shot: Exposure) -> Doubles:
+    """Return how far each complete flash is from the nearest true one."""
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    found = [flash for flash in timing.flashes if flash.complete and flash.lights]
+    return np.array([np.abs(true_s - flash.start_s).min() for flash in found])
+
+
 def test_flashes_that_stray_in_a_short_clip_are_followed_and_what_is_left_is_claimed(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=ROWS, width_px=COLUMNS)
     row_s = plan.camera.row_time_s
     shot = shoot(plan, frames=36, jitter_s=row_s)
     timing = timing_of(plan, shot)
-    lit = [flash for flash in timing.flashes if flash.complete and flash.lights]
-    true_s = np.array([flash.start_s for flash in shot.flashes])
-    off_s = np.array([np.abs(true_s - flash.start_s).min() for flash in lit])
+    off_s = strayed_s(timing, shot)
     assert np.sqrt(np.mean(off_s**2)) < 2 * timing.phase_error_rows * row_s
     assert np.median(off_s) < 0.1 * row_s
 
@@ -91,10 +98,7 @@ def test_flashes_that_stray_are_followed_one_by_one(make_plan: PlanMaker) -> Non
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, dark=False)
     shot = shoot(plan, jitter_s=1e-5)
     timing = timing_of(plan, shot)
-    inside = [f for f in timing.flashes if f.complete]
-    true_s = np.array([flash.start_s for flash in shot.flashes])
-    error_s = np.array([np.abs(true_s - flash.start_s).min() for flash in inside])
-    assert np.sqrt(np.mean(error_s**2)) < 0.4e-5
+    assert np.sqrt(np.mean(strayed_s(timing, shot) ** 2)) < 0.4e-5
     assert timing.phase_error_rows * timing.row_time_s < 1e-5
 
 
@@ -108,11 +112,9 @@ def test_flashes_that_stray_are_followed_where_few_rows_open_and_close_during_th
     dim = {slot: plate * ends for slot, plate in plates(plan).items()}
     shot = shoot(plan, frames=60, jitter_s=0.3 * row_s, scene=dim, noise=Noise(full_well_e=8000, read_e=8))
     timing = timing_of(plan, shot)
-    lit = [flash for flash in timing.flashes if flash.complete and flash.lights]
-    true_s = np.array([flash.start_s for flash in shot.flashes])
-    error_s = np.array([np.abs(true_s - flash.start_s).min() for flash in lit])
-    assert np.sqrt(np.mean(error_s**2)) < 2 * timing.phase_error_rows * row_s
-    assert np.median(error_s) < 0.1 * row_s
+    off_s = strayed_s(timing, shot)
+    assert np.sqrt(np.mean(off_s**2)) < 2 * timing.phase_error_rows * row_s
+    assert np.median(off_s) < 0.1 * row_s
 
 
 @pytest.mark.parametrize(("full_well_e", "followed"), [(1500, True), (700, False)])
@@ -124,9 +126,7 @@ def test_flashes_that_stray_are_followed_or_in_the_error_where_rows_show_each_by
     row_s = plan.camera.row_time_s
     shot = shoot(plan, frames=80, jitter_s=0.08 * row_s, noise=Noise(full_well_e=full_well_e, read_e=8))
     timing = timing_of(plan, shot)
-    lit = [flash for flash in timing.flashes if flash.complete and flash.lights]
-    true_s = np.array([flash.start_s for flash in shot.flashes])
-    off_s = np.array([np.abs(true_s - flash.start_s).min() for flash in lit])
+    off_s = strayed_s(timing, shot)
     assert not followed or np.median(off_s) < 0.03 * row_s
     assert np.sqrt(np.mean(off_s**2)) < 2 * timing.phase_error_rows * row_s
 

@@ -1,21 +1,18 @@
 """The virtual sensor against brute force, closed forms, and another simulator's clips."""
 
-import json
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import OpenEXR
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from picture_file import read_picture
+from other_simulator import flashes_told, plan_and_frames
 
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.synth import MainsSwing, Noise, TrueClock, expose
@@ -252,8 +249,8 @@ def test_frames_saturate_and_come_in_the_converters_steps() -> None:
 @pytest.mark.parametrize("clip", ["plain", "ambient"])
 def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data: Path, clip: str) -> None:
     folder = shared_data / "clips" / clip
-    plan = read_plan(folder / "plan.toml")
-    truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
+    plan, images = plan_and_frames(folder)
+    truth, light = flashes_told(folder), np.stack(images)
     slots = {next(iter(flash.lights), None): slot for slot, flash in enumerate(plan.flashes)}
     plates = {slots[row["light"]]: _exr(folder / "truth" / row["plate"]) for row in truth if "plate" in row}
     first = truth[0]
@@ -261,10 +258,7 @@ def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data
     ppm = (first["duration_s"] / planned.duration_s - 1) * 1e6
     strobe_s = float(plan.train(slots[first["light"]], 1).start_s[0])
     clock = TrueClock(phase_s=first["start_s"] - strobe_s * (1 + ppm * 1e-6), offset_ppm=ppm)
-    files = sorted((folder / "frames").iterdir())
-    codes = np.stack([read_picture(file, cv2.IMREAD_UNCHANGED)[..., ::-1] for file in files]).astype(np.float32)
-    light = (codes - 4097) / (65535 - 4097)
-    shot = expose(plates, plan, frames=len(files), clock=clock)
+    shot = expose(plates, plan, frames=len(images), clock=clock)
     for flash, row in zip(shot.flashes, truth, strict=True):
         assert flash.start_s == pytest.approx(row["start_s"], abs=1e-9)
         assert flash.complete == row["complete"]
