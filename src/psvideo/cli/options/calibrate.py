@@ -16,6 +16,12 @@ PicturesOfTakes = Annotated[
 RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
 RigIn = Annotated[Path, typer.Option("--rig", help="The rig whose directions or positions are known.")]
 FocalPx = Annotated[float | None, typer.Option(help="Focal length in pixels.", min=1)]
+TargetAlbedo = Annotated[
+    float, typer.Option("--albedo", help="The target's albedo: white paper 0.85, a white card 0.9.")
+]
+TargetBox = Annotated[
+    str | None, typer.Option(help="The target's part of the picture: left,top,right,bottom in pixels.")
+]
 Transfer = Annotated[str | None, typer.Option(help="Transfer curve of the stills: linear, srgb, slog3, ...")]
 FocalMm = Annotated[float | None, typer.Option(help="Focal length in mm; needs --sensor-mm.", min=0.1)]
 SensorMm = Annotated[

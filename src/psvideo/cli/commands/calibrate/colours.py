@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import Annotated
-
-import typer
 
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
-from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
+from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, TargetAlbedo, TargetBox, Transfer
 from psvideo.cli.options.clip_and_run import ClipWords, Force, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_box
@@ -22,10 +19,8 @@ def colours(
     rig: RigIn,
     out: RigOut,
     *,
-    albedo: Annotated[float, typer.Option(help="The card's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
-    box: Annotated[
-        str | None, typer.Option(help="The card's part of the picture: left,top,right,bottom in pixels.")
-    ] = None,
+    albedo: TargetAlbedo = 0.9,
+    box: TargetBox = None,
     transfer: Transfer = None,
     words: ClipWords,
     force: Force = False,
