@@ -21,7 +21,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round, coming, light_plates
 from psvideo.plates.split import split
-from psvideo.report.observe.motion import glimpse, motion_between
+from psvideo.report.observe.motion import Glimpse, glimpse, motion_between
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.noise import NOISELESS
 
@@ -263,6 +263,35 @@ def test_fine_detail_that_goes_by_everywhere_moves_and_is_no_noise(px: float) ->
     assert found is not None
     assert found.share > 0.05
     assert found.speed_px_s == pytest.approx(10 * px, rel=0.25)
+
+
+@pytest.mark.parametrize("px", [0.25, 0.4])
+@pytest.mark.parametrize(("radius", "share"), [(120, (0.26, 0.34)), (500, (1.0, 1.0))])
+def test_fine_detail_that_shifts_a_little_before_a_smooth_wall_is_not_all_of_the_picture(
+    radius: int, share: tuple[float, float], px: float
+) -> None:
+    """A disc of 28 % of the picture was all of it, where it shifted so little that it passed for noise."""
+    rows, cols = np.mgrid[:400, :400] - 199.5
+    paint = cv2.GaussianBlur(np.random.default_rng(5).normal(size=(440, 440)), (0, 0), 0.8)
+
+    def seen(shift_px: float, number: int, white: float | None = None) -> Glimpse:
+        way = np.array([[1, 0, shift_px - 20], [0, 1, -20]], np.float64)
+        detail = cv2.warpAffine(paint, way, (400, 400), flags=cv2.INTER_CUBIC)
+        inside = np.clip(radius - np.hypot(cols - shift_px, rows) + 0.5, 0, 1)
+        image = inside * (0.4 + 0.03 * detail / paint.std()) + (1 - inside) * 0.35
+        image += 0.002 * np.random.default_rng(number).normal(size=image.shape)
+        whole = np.ones(400, np.bool_)
+        picture = mixture_of(np.asarray(image, np.float32))
+        return glimpse(LightPlate(light="a", number=number, time_s=0.1 * number, picture=picture, seen=whole), white)
+
+    before = seen(0, 0)
+    found = motion_between(before, seen(px, 1, before.white))
+    assert found is not None
+    assert found.changed is not None
+    assert share[0] <= found.share <= share[1]
+    assert found.speed_px_s == pytest.approx(10 * px, rel=0.25)
+    assert found.changed[200, 200]
+    assert found.changed[5, 5] == (radius > 400)
 
 
 @pytest.mark.parametrize("noise", [0.003, 0.03])

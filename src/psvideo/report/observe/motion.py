@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.ranks import median, quantile
 from psvideo.model.arrays import Bytes, Flags, Floats
-from psvideo.plates.align.shake.registered import correlation, registered
+from psvideo.plates.align.shake.registered import Shift, correlation, registered, shifted
 from psvideo.plates.align.velocity.flow import TOE, pixel_places
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
@@ -35,6 +35,11 @@ turns."""
 WHITE, AGREE, ALIKE = 0.15, 0.02, 0.8
 """What changes is noise where neighbours change alike by less than the first; and a picture did not shift where one
 shift makes details alike by less than the second more, or by less than the third."""
+ALIKE_PX, GAINS, BEYOND_CHANCE = 17, 0.05, 3.0
+"""By how much a shift makes detail more alike is averaged over so many pixels. Something goes by where that is more
+than the second share of the most of it, and so many times what chance makes of it: as much is lost by it elsewhere."""
+DARK_CODES, NEARLY_ALL = 30, 0.8
+"""What has no more of the first is dark; where more than the second of the rest goes by, all of the picture does."""
 FOLLOWED = 0.3
 """Where there and back meet for less than this share of what changed, or explain less of it, flow gives no speed."""
 
@@ -54,7 +59,8 @@ class Glimpse:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Speed of the fastest things in pixels of the picture per second, and which share of the picture moves. The speed
+    """Speed of the fastest things in pixels of the picture per second, and which share of the picture moves: all of it
+    where nearly all that is lit shifts alike. The speed
     is None where most of what changes cannot be followed from one round to the next. ``changed`` (row, col), of the
     glimpses' pixels, is what they do not show alike, moving shadows too; None where nothing changed."""
 
@@ -100,9 +106,12 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     change = _change(one, other)
     changed = _changed(change)
     share, still = np.count_nonzero(changed) / changed.size, Motion(speed_px_s=0.0, share=0.0)
-    if share <= FEW_BLOCKS and (way_px := _shifted_px(one, other, change) * before.scale):
-        speed_px_s = way_px / abs(after.time_s - before.time_s)
-        return Motion(speed_px_s=speed_px_s, share=1.0, changed=np.ones_like(changed))
+    if share <= FEW_BLOCKS and (shift := _shifted(one, other, change)) is not None:
+        speed_px_s = float(np.hypot(*shift.px)) * before.scale / abs(after.time_s - before.time_s)
+        goes_by = _goes_by(one, other, shift)
+        if np.count_nonzero(goes_by & (one > DARK_CODES)) > NEARLY_ALL * np.count_nonzero(one > DARK_CODES):
+            goes_by = np.ones_like(changed)  # what is dark is alike wherever it goes
+        return Motion(speed_px_s=speed_px_s, share=float(goes_by.mean()), changed=goes_by)
     if share <= LEAST_BLOCKS:
         return still
     search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
@@ -130,23 +139,38 @@ def _changed(change: Floats) -> NDArray[np.bool_]:
 def _change(one: Floats, other: Floats) -> Floats:
     """Return by how much pictures differ beside one factor of all light, whose change is none."""
     early, late = one[::2, ::2], other[::2, ::2]  # medians of a quarter are as good
-    bright = early > 30
+    bright = early > DARK_CODES
     level = median(late[bright] / early[bright]) if bright.any() else 1.0
     return np.asarray(other - one * np.float32(level), np.float32)
 
 
-def _shifted_px(one: Floats, other: Floats, change: Floats) -> float:
-    """Return by how much a picture shifted as a whole, 0 where it did not: fine detail that goes by everywhere looks
-    like noise, but neighbours go by together, and one shift brings it back."""
+def _shifted(one: Floats, other: Floats, change: Floats) -> Shift | None:
+    """Return by how much fine detail shifted, None where it did not: what goes by everywhere looks like noise, but
+    neighbours go by together, and one shift brings it back."""
     change = change[::2]
     size = max(float(np.mean(change * change, dtype=np.float64)), 1e-12)
     if abs(float(np.mean(change[:, 1:] * change[:, :-1], dtype=np.float64))) < WHITE * size:
-        return 0.0
-    details = [np.asarray(picture - cv2.blur(picture, (DETAIL_PX, DETAIL_PX)), np.float32) for picture in (one, other)]
+        return None
+    details = _detail(one), _detail(other)
     shift = registered(*details)
-    if shift.alike < max(correlation(*details) + AGREE, ALIKE):
-        return 0.0
-    return float(np.hypot(*shift.px))
+    if shift.alike < max(correlation(*details) + AGREE, ALIKE) or not shift.px.any():
+        return None
+    return shift
+
+
+def _goes_by(one: Floats, other: Floats, shift: Shift) -> Flags:
+    """Return where a shift makes detail more alike than the same shift the other way, which smooths it as much, (row,
+    col): all of a wall that goes by, and of a cloth before a smooth wall the cloth alone. What is smooth looks the same
+    wherever it goes."""
+    detail, there = _detail(one), _detail(other)
+    back, forth = (shifted(there, way * shift.px) for way in (-1, 1))
+    gains = cv2.blur(detail * (back - forth), (ALIKE_PX, ALIKE_PX))
+    chance = float(np.sqrt(np.mean(np.minimum(gains, 0) ** 2, dtype=np.float64)))
+    return np.asarray(gains > max(GAINS * float(gains.max()), BEYOND_CHANCE * chance))
+
+
+def _detail(picture: Floats) -> Floats:
+    return np.asarray(picture - cv2.blur(picture, (DETAIL_PX, DETAIL_PX)), np.float32)
 
 
 def _well_within(changed: Flags) -> Flags:
