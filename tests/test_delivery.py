@@ -445,8 +445,11 @@ def test_lights_that_usd_cannot_tell_apart_get_names_of_their_own(lights: tuple[
     made = Delivered(
         clip="a@b", numbers=(1, 2), fps=Fraction(24), width_px=64, height_px=48, metric=False, delivery=delivery
     )
-    seen = tuple(SeenLight(name=one, direction=(0, 0, 1)) for one in lights)
+    seen = (SeenLight(name=lights[0], direction=(0.6, 0.0, 0.8)), SeenLight(name=lights[1], direction=(0.0, 0.6, 0.8)))
     view = StageView(focal=1.0, middle=(0.0, 0.0), away_m=None, poses={}, lights=seen)
     (tmp_path / "x.usda").write_text(stage_text(made, (1, 2), view), encoding="utf-8")
     stage = usd.Stage.Open(str(tmp_path / "x.usda"))
-    assert len([prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight"]) == len(lights)
+    suns = [prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight"]
+    assert len({sun.GetName() for sun in suns}) == 2
+    ways = [np.array(sun.GetAttribute("xformOp:transform").Get())[2, :3] for sun in suns]
+    np.testing.assert_allclose(ways, [one.direction for one in seen], atol=1e-6)

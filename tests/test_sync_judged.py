@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from disturbed_shots import rms_rows
 from row_means import rows_of
 from scipy.ndimage import gaussian_filter  # type: ignore[attr-defined]
 
@@ -195,7 +196,9 @@ def test_a_strobe_that_nearly_keeps_step_with_the_frames_is_no_noise(make_plan: 
     plates = {slot: (0.2 + 0.5 * rng.random((96, COLUMNS))).astype(np.float32) for slot in plan.lit_slots}
     clock = TrueClock(phase_s=0.0123, offset_ppm=40.0)
     shot = expose(plates, plan, frames=40, clock=clock, noise=NOISE, bits=12)
-    assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).phase_error_rows < 0.01
+    timing = timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64))
+    assert timing.phase_error_rows < 0.01
+    assert rms_rows(timing, shot, plan) < 0.02
 
 
 def test_another_shutter_is_believed_where_it_leaves_clearly_less_of_the_whole_clip(
