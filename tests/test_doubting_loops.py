@@ -18,6 +18,7 @@ from psvideo.solve.normals.trust import surroundings as of_around
 from psvideo.solve.normals.trust import thin_surface as thin
 from psvideo.solve.normals.trust import torn as of_torn
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
+from psvideo.solve.normals.trust.hidden_share import hidden_of
 from psvideo.solve.normals.trust.indirect_kernel import FACING, MOST_INDIRECT, SHADOWED, indirect_rows
 from psvideo.solve.normals.trust.judging_kernel import add_rows
 from psvideo.solve.normals.trust.signs import Signs, signs_of
@@ -122,7 +123,7 @@ def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) 
         likely_torn_deg=np.sqrt(np.maximum(likely, 0)),
         noise_deg=noise_deg,
         lost_deg=noise_deg * np.sqrt(wider - 1),
-        hidden=of_signs.hidden_of(one.lit, plain=plain),
+        hidden=hidden_of(one.lit, plain=plain),
         plain=plain,
     )
 

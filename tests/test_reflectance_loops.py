@@ -4,17 +4,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from psvideo.solve.normals.robust.point_sums import add_squares, descend_within, take_off_own
 from psvideo.solve.normals.robust.reflectance_kernel import (
     LEAST_SHARE,
     LONGEST_STEP,
     MOST_BRIGHT,
     WIDTH,
-    add_squares,
-    descend_within,
     fill_parts,
     fill_roughness_in_the_fit,
     solve_again,
-    take_off_own,
 )
 from psvideo.solve.normals.task import FEW
 

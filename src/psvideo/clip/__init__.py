@@ -9,7 +9,7 @@ colour of a mosaic.
   ``profile_curve`` and ``stated_curve`` (by which curve they code light), ``filters`` (whether they are a mosaic) and
   ``movie_rate`` (how a movie's rate goes with the plan's)
 - reading: ``reading``, ``transfer`` and ``linear`` (from codes to light), ``tagged_curve`` (whether files say that they
-  were coded otherwise), ``in_file`` and ``kept`` (codes that are not in memory)
+  were coded otherwise), ``in_file``, ``kept`` and ``shown_file`` (codes that are not in memory)
 
 Rooms: ``decode`` (one module for each kind of file), ``streams`` (frames that come while they are recorded), ``maps``
 (masks and depth that others made of the footage).

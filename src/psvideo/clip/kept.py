@@ -6,7 +6,6 @@ it stays behind. What does not fit is not kept, and is decoded again where it is
 """
 
 import contextlib
-import os
 import shutil
 import sys
 import tempfile
@@ -22,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decoded import CodedPicture, Header, PictureInFile
-from psvideo.clip.in_file import RowsInFile, read_whole
+from psvideo.clip.in_file import RowsInFile
+from psvideo.clip.shown_file import PassingPlace, ShownFile, not_given_back
 from psvideo.errors import PsvideoError
 
 SHARE_OF_FREE_SPACE = 0.5
@@ -49,7 +49,7 @@ class Kept:
 
     def __init__(self, file: FileIO, *, most_bytes: int) -> None:
         self._file = file
-        self._shown = None if sys.platform == "win32" else _Shown(file)
+        self._shown = None if sys.platform == "win32" else ShownFile(file)
         self._most_bytes = most_bytes
         self._places: dict[int, _Place] = {}
         self._free: dict[int, list[int]] = {}
@@ -117,7 +117,7 @@ class Kept:
             except OSError:
                 self._most_bytes = 0
                 return codes
-        return RowsInFile(offset=offset, kind=codes.dtype, shape=codes.shape, file=_Passing(shown, offset, free))
+        return RowsInFile(offset=offset, kind=codes.dtype, shape=codes.shape, file=PassingPlace(shown, offset, free))
 
     def get(self, number: int, *, in_file: bool = False) -> CodedPicture | PictureInFile:
         """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back.
@@ -134,9 +134,9 @@ class Kept:
                 self._file.seek(place.offset)
                 read = _filled(self._file, codes.data.cast("B"))
         except OSError as fault:
-            raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
+            raise not_given_back(str(fault.strerror or fault)) from fault
         if read != codes.nbytes:
-            raise PsvideoError(f"{_UNREADABLE} ({read} of {codes.nbytes} bytes of frame {number}). {_ADVICE}")
+            raise not_given_back(f"{read} of {codes.nbytes} bytes of frame {number}")
         return CodedPicture(header=place.header, codes=codes)
 
 
@@ -148,57 +148,10 @@ def _filled(file: FileIO, room: memoryview) -> int:
     return done
 
 
-class _Shown:
-    """The file as those see it who read rows of its pictures; open until the last of them is gone."""
-
-    def __init__(self, file: FileIO) -> None:
-        self._opened = -1  # while nothing is open
-        self._opened = os.dup(file.fileno())
-
-    def __del__(self) -> None:
-        if self._opened >= 0:
-            os.close(self._opened)
-
-    def opened(self) -> int:
-        """Return the file, which is open, and nobody else's."""
-        return self._opened
-
-    def read(self, into: memoryview, begin: int) -> None:
-        """Read as many bytes as there is room for, from the byte ``begin`` on."""
-        try:
-            whole = read_whole(self._opened, into, begin)
-        except OSError as fault:
-            raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
-        if not whole:
-            raise PsvideoError(f"{_UNREADABLE} (it ends at byte {begin} or after). {_ADVICE}")
-
-
-class _Passing:
-    """The same for one picture, whose place is free once nobody holds it."""
-
-    def __init__(self, shown: _Shown, offset: int, free: list[int]) -> None:
-        self._shown, self._offset, self._free = shown, offset, free
-
-    def __del__(self) -> None:
-        self._free.append(self._offset)
-
-    def opened(self) -> int:
-        """Return the file, which is open, and nobody else's."""
-        return self._shown.opened()
-
-    def read(self, into: memoryview, begin: int) -> None:
-        """Read as many bytes as there is room for, from the byte ``begin`` on."""
-        self._shown.read(into, begin)
-
-
 def _write_all(file: FileIO, data: memoryview) -> None:
     """Write all of it; a disk that is nearly full takes a part and then raises OSError."""
     while data:
         data = data[file.write(data) :]
-
-
-_UNREADABLE = "The temporary file that holds decoded frames and plates cannot be read back"
-_ADVICE = "Check the disk that the output is on, then run the command again."
 
 
 @contextlib.contextmanager

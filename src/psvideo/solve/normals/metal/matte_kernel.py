@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Doubles
 from psvideo.solve.normals.metal.lobe_kernel import TINY, shown_by_lobes
-from psvideo.solve.normals.robust.reflectance_kernel import solve_symmetric
+from psvideo.solve.normals.robust.point_sums import add_square, solve_symmetric
 
 MOST_ALIKE, LEAST_ALIKE = 3.0, 0.1
 """What a matte surface's residual is over the metal's, between these, for the same turn of the normal."""
@@ -64,12 +64,7 @@ def fill_matte(
             sine = np.sqrt(max(1.0 - cosines[light] * cosines[light], 0.0))
             per = min(max(sine / max(turns, TINY), LEAST_ALIKE), MOST_ALIKE)
             left[light] = counts[light, p] * per * (measured[light, p] / max(scale, TINY) - shown)
-            m[0] += lx * lx
-            m[1] += lx * ly
-            m[2] += lx * lz
-            m[3] += ly * ly
-            m[4] += ly * lz
-            m[5] += lz * lz
+            add_square(m, 1.0, lx, ly, lz)
             own[0] += left[light] * lx
             own[1] += left[light] * ly
             own[2] += left[light] * lz

@@ -13,6 +13,6 @@
 6. ``handing_out``: what was solved goes where the picture's results lie
 
 Where a subject is not matte, ``reflectance`` takes points of it (``subject_points``), ``reflectance_fit`` finds which
-kind of ``reflectance_model`` fits them (its loops are ``reflectance_kernel``), and ``reflecting`` solves its pixels
-again with that, by what the model shows there and gains with the normal (``reflected_light``).
+kind of ``reflectance_model`` fits them (its loops are ``reflectance_kernel`` and ``point_sums``), and ``reflecting``
+solves its pixels again with that, by what the model shows there and gains with the normal (``reflected_light``).
 """

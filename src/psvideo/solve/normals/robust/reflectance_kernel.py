@@ -1,16 +1,15 @@
-"""The reflectance fit's loops over points and lights, compiled: numpy takes longer to call than to add up so few.
+"""What a subject's model shows at its points, and a step of their normals under it, compiled.
 
 Arrays are those of ``SubjectPoints``: (light, point), directions (light, point, 3) and (point, 3).
 """
 
 import numpy as np
 
-from psvideo.compute.compiled import EXACT, FUSED
+from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Doubles
+from psvideo.solve.normals.robust.point_sums import add_square, along_way, solve_symmetric
 from psvideo.solve.normals.task import FEW
 
-DESCENTS = 50
-"""Mostly far fewer are needed."""
 LEAST_FACING = 0.05
 """Of the cosines that roughness is divided by."""
 MOST_BRIGHT = 5.0
@@ -21,25 +20,6 @@ LEAST_SHARE = 0.01
 """A pixel's residuals are at least this share of its light."""
 LONGEST_STEP = 0.3
 """Of a normal times albedo, as a share of it."""
-
-
-@EXACT.kept
-def descend_within(square: Doubles, wanted: Doubles, least: Doubles, most: Doubles, found: Doubles) -> None:
-    """Fill ``found`` with the least of a strictly convex square form within bounds, number by number."""
-    size = len(found)
-    found[:] = 0.0
-    for _ in range(DESCENTS):
-        moved = False
-        for k in range(size):
-            other = 0.0
-            for n in range(size):
-                if n != k:
-                    other += square[k, n] * found[n]
-            now = min(max((wanted[k] - other) / square[k, k], least[k]), most[k])
-            moved = moved or now != found[k]
-            found[k] = now
-        if not moved:
-            break
 
 
 @FUSED.inlined
@@ -59,12 +39,6 @@ def fill_roughness_in_the_fit(angles: Doubles, found: Doubles) -> None:
     normal and light, normal and camera, light and camera."""
     for n in range(angles.shape[1]):
         found[0, n], found[1, n], found[2, n] = _roughness(angles[0, n], angles[1, n], angles[2, n])
-
-
-@FUSED.inlined
-def _along(ways: Doubles, light: int, point: int, normal: Doubles) -> float:
-    x, y, z = ways[light, point, 0], ways[light, point, 1], ways[light, point, 2]
-    return float(x * normal[0] + y * normal[1] + z * normal[2])
 
 
 @FUSED.inlined
@@ -94,7 +68,7 @@ def fill_parts(
         size = _size_and_normal(g, p, normal)
         bright, facing = min(typical / size, MOST_BRIGHT), _facing(to_camera, p, normal)
         for light in range(len(measured)):
-            c, h = _along(towards, light, p, normal), max(_along(half, light, p, normal), 0.0)
+            c, h = along_way(towards, light, p, normal), max(along_way(half, light, p, normal), 0.0)
             lit = 1.0 if c > 0.0 else 0.0
             h8 = ((h * h) ** 2) ** 2
             h32 = (h8 * h8) ** 2
@@ -106,69 +80,6 @@ def fill_parts(
             parts[4, light, p] = lit * bright * h8
             parts[5, light, p] = lit * bright * h32
             parts[6, light, p] = lit * bright * (h32 * h32) ** 2
-
-
-@FUSED.inlined
-def _add_square(m: Doubles, weight: float, x: float, y: float, z: float) -> None:
-    """Add a vector's square, so often, to a matrix (its upper triangle row by row)."""
-    m[0] += weight * x * x
-    m[1] += weight * x * y
-    m[2] += weight * x * z
-    m[3] += weight * y * y
-    m[4] += weight * y * z
-    m[5] += weight * z * z
-
-
-@FUSED.inlined
-def solve_symmetric(m: Doubles, x: Doubles) -> None:
-    """Solve with a positive definite matrix (its upper triangle row by row); the answer stands in ``x``."""
-    b, c = m[1] / m[0], m[2] / m[0]
-    d = m[3] - b * m[1]
-    t = m[4] - c * m[1]
-    e = t / d
-    f = m[5] - c * m[2] - e * t
-    y = x[1] - b * x[0]
-    x[2] = (x[2] - c * x[0] - e * y) / f
-    x[1] = y / d - e * x[2]
-    x[0] = x[0] / m[0] - b * x[1] - c * x[2]
-
-
-@FUSED.kept
-def take_off_own(towards: Doubles, weights: Doubles, parts: Doubles, left: Doubles) -> None:
-    """Fill ``left`` with what a vector of each pixel's own does not explain of the parts (part, light, point)."""
-    matrix, own = np.empty(6), np.empty(3)
-    for p in range(parts.shape[2]):
-        matrix[:] = 0.0
-        matrix[0] = matrix[3] = matrix[5] = 1e-9
-        for light in range(len(towards)):
-            x, y, z = towards[light, p, 0], towards[light, p, 1], towards[light, p, 2]
-            _add_square(matrix, weights[light, p], x, y, z)
-        for k in range(len(parts)):
-            own[:] = 0.0
-            for light in range(len(towards)):
-                for i in range(3):
-                    own[i] += weights[light, p] * parts[k, light, p] * towards[light, p, i]
-            solve_symmetric(matrix, own)
-            for light in range(len(towards)):
-                left[k, light, p] = parts[k, light, p] - _along(towards, light, p, own)
-
-
-@FUSED.kept
-def add_squares(weights: Doubles, left: Doubles, square: Doubles, right: Doubles) -> None:
-    """Fill the model's normal equations: sums over lights and points of the weighted products of what each of its
-    numbers adds, ``left[1:]``, with each other and with what was measured, ``left[0]``."""
-    square[:], right[:] = 0.0, 0.0
-    size = len(right)
-    for light in range(weights.shape[0]):
-        for p in range(weights.shape[1]):
-            for k in range(size):
-                part = weights[light, p] * left[1 + k, light, p]
-                right[k] += part * left[0, light, p]
-                for j in range(k + 1):
-                    square[k, j] += part * left[1 + j, light, p]
-    for k in range(size):
-        for j in range(k):
-            square[j, k] = square[k, j]
 
 
 @FUSED.inlined
@@ -202,7 +113,7 @@ def solve_again(
         many = 0.0
         for light in range(lights):
             many += counts[light, p]
-            c, h = _along(towards, light, p, normal), max(_along(half, light, p, normal), 0.0)
+            c, h = along_way(towards, light, p, normal), max(along_way(half, light, p, normal), 0.0)
             lit = 1.0 if c > 0.0 else 0.0
             towards_camera = _facing(to_camera, p, towards[light, p])
             added, added_by_c, added_by_facing = _roughness(c, facing, towards_camera)
@@ -227,7 +138,7 @@ def solve_again(
         matrix[:], right[:] = 0.0, 0.0
         for light in range(lights):
             weight = counts[light, p] / (1 + (rest[light] / (width * spread)) ** 2)
-            _add_square(matrix, weight, rows[light, 0], rows[light, 1], rows[light, 2])
+            add_square(matrix, weight, rows[light, 0], rows[light, 1], rows[light, 2])
             for i in range(3):
                 right[i] += weight * matte[light] * rows[light, i]
         more = 1e-6 * (matrix[0] + matrix[3] + matrix[5]) + 1e-12

@@ -104,7 +104,7 @@ def parts_of(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlac
 
 def left_over(points: SubjectPoints, weights: Doubles, parts: Doubles) -> Doubles:
     """Return what a vector of each pixel's own leaves of parts (part, light, point)."""
-    from psvideo.solve.normals.robust.reflectance_kernel import take_off_own
+    from psvideo.solve.normals.robust.point_sums import take_off_own
 
     left = np.empty_like(parts)
     take_off_own(points.towards, weights, parts, left)
@@ -116,7 +116,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, sought: Sought) ->
 
     What a pixel's own normal and albedo explain as well is taken off first: of that, other pixels say nothing.
     """
-    from psvideo.solve.normals.robust.reflectance_kernel import add_squares
+    from psvideo.solve.normals.robust.point_sums import add_squares
 
     parts = parts_of(points, g, typical, sought.in_place)
     weights, model, spread = points.counts, np.zeros(NUMBERS), 1.0
@@ -139,7 +139,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, sought: Sought) ->
 def _bounded(square: Doubles, right: Doubles, sought: Sought) -> Doubles:
     """Return the least squares solution within what surfaces do: highlights add, the curve is no more than one, what is
     rough is not dark under grazing light as well, and what is soft has no curve of its own."""
-    from psvideo.solve.normals.robust.reflectance_kernel import descend_within
+    from psvideo.solve.normals.robust.point_sums import descend_within
 
     least, most = np.array((-MOST_CURVE, *(0.0,) * 5)), np.array((MOST_CURVE, 0.0, 0.0, *(MOST_LOBE,) * 3))
     if sought.kind == "rough":

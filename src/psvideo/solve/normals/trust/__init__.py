@@ -11,8 +11,8 @@ something shines (``by_colour``), shadows that pass for light (``lit_shadows``),
 directions depend on the distance), ``moving_doubt`` (plates that do not match after alignment, beside what more than
 three lights say of them, ``witness``; ``agreeing`` takes off what these do not bear out), ``few_checked`` (by how much
 a model of the subject would turn normals under four and five lights), and ``unchecked`` (what three lights leave of
-real surfaces, and show hardly anywhere; and how well few lights check each other). Loops of the signs are in
-``signs_kernel``. ``doubting`` says how much each counts, and makes one doubt of them; its loop is ``doubting_kernel``.
-``doubts`` are those of several looks at what stands still, and ``repeats`` shows by them how large noise is that detail
-does not show.
+real surfaces, and show hardly anywhere; and how well few lights check each other; ``hidden_share``: how much of what is
+not matte lights hide altogether). Loops of the signs are in ``signs_kernel``. ``doubting`` says how much each counts,
+and makes one doubt of them; its loop is ``doubting_kernel``. ``doubts`` are those of several looks at what stands
+still, and ``repeats`` shows by them how large noise is that detail does not show.
 """

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.evidence import Evidence, Indirect
-from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.trust.added_light import Added, added_unseen, modelled_deg
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_length import by_length_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
 from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
+from psvideo.solve.normals.trust.hidden_share import hidden_of
 from psvideo.solve.normals.trust.indirect import not_of_motion
 from psvideo.solve.normals.trust.lit_shadows import LitShadows, shadows_of
 from psvideo.solve.normals.trust.surroundings import UNSURE_OF_NOISE, Surroundings, roots
@@ -32,10 +32,8 @@ from psvideo.solve.normals.trust.thin_surface import ThinSurface, blurred, line
 from psvideo.solve.normals.trust.torn import torn_angles_deg
 from psvideo.solve.normals.trust.unchecked import (
     ALL_EXPLAINED,
-    FEW_LIGHTS,
     reached_by_all,
     torn_share,
-    turned_unseen,
     unseen_share,
 )
 
@@ -46,14 +44,6 @@ MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
 """Samples this far apart are compared: a codec's errors are alike in nearer ones. The misfit of surfaces changes by
 up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
-ENOUGH_LIGHTS = 12
-"""What ``hidden`` is measured by: this many lights hide little of what is not matte."""
-TELLING, TELLING_OF_FOUR, FOUR_BESIDE_SLOPE, HIDDEN_POWER, MOST_HIDDEN = 2.6, 16.0, 24.0, 0.8, 2.0
-"""How far lights hide what is not matte beside sets of lights that turn normals unseen (``turned_unseen``) so many
-times, five and six of them, or four, or four where albedo by slope counts as well, with this power of it, and up to so
-much more. Over 490 sets of 4 to 8 lights of bear, cat, ball, bunny and grey sphere, errors over claims of a subject go
-with that measure to the powers 0.4 to 0.6 (half of this one is used, ``few_power``), and not with the lights' condition
-number. More would trust less that is wrong, and claim medians that are over 1.5 times too large."""
 WHOLE = ("hidden", "plain", "shadows_lit", "unsaid")
 """What ``Signs`` says of all points at once."""
 ONE_LEFT = ALL_EXPLAINED + 1
@@ -195,36 +185,6 @@ def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
     fit = np.ascontiguousarray(points.fit_deg)
     fill_changes(fit, points.known_bytes, noise, apart, most, scale, unsure, changes)
     return changes
-
-
-def hidden_of(lit: Illumination, *, plain: bool, beside_slope: bool = True) -> float:
-    """Return how many times more than ``ENOUGH_LIGHTS`` these lights hide of what is not matte, since a normal and an
-    albedo follow it: by their number or, of four to six, by how they stand, whichever is more.
-
-    plain: residuals are of least squares, whose mean squares are for each measurement left free: their number does not
-    matter. beside_slope: what albedo shows is counted by itself (``by_slope.py``).
-    """
-    lights = len(lit.directions)
-    by_number = 1.0 if plain else hidden_by(lights) / hidden_by(ENOUGH_LIGHTS)
-    few = ALL_EXPLAINED < lights <= FEW_LIGHTS
-    return max(by_number, _hidden_by_places(lit, plain=plain, beside_slope=beside_slope)) if few else by_number
-
-
-def _hidden_by_places(lit: Illumination, *, plain: bool, beside_slope: bool) -> float:
-    """Return the same of few lights by how they stand: how much farther than others they turn normals unseen, as a
-    power, up to ``MOST_HIDDEN``. Least squares is what solves four, and their measure of its own."""
-    of_four = FOUR_BESIDE_SLOPE if beside_slope else TELLING_OF_FOUR
-    times = turned_unseen(lit) / (of_four if plain else TELLING)
-    return min(float(times**HIDDEN_POWER), MOST_HIDDEN)
-
-
-def hidden_by(lights: int) -> float:
-    """Return all lights over those that a normal and an albedo leave to be held against them.
-
-    >>> hidden_by(5), hidden_by(12)
-    (2.5, 1.3333333333333333)
-    """
-    return lights / max(lights - 3, 1)
 
 
 def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
