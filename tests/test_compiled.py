@@ -423,3 +423,5 @@ def test_a_full_disk_under_the_cache_does_not_stop_a_solution(monkeypatch: pytes
     lit = Illumination(directions=directions, intensities=np.ones((3, 1)))
     surface = solve(LitPlates([np.full((2, 2), 0.5, np.float32)] * 3, lit))
     assert surface.valid.all()
+    true = np.linalg.solve(directions, np.full(3, 0.5))
+    np.testing.assert_allclose(surface.normals, np.broadcast_to(true / np.linalg.norm(true), (2, 2, 3)), atol=1e-6)
