@@ -56,8 +56,8 @@ def convert(
 
 
 def _check_names(path: Path, names: Sequence[str]) -> None:
-    """Raise UsageError where a list of lights is given another number of names, or writes some of these itself, which
-    belong to the lights that it gives them to."""
+    """Raise UsageError where there are not as many names as the list has lights, or where one of them is the name that
+    the list itself gives to another light."""
     listed = read_rig(path).names
     if any(name in listed and name != own for name, own in zip(names, listed, strict=False)):
         raise UsageError(
@@ -72,6 +72,6 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
 
 
 def _typed(names: Sequence[str]) -> str:
-    """Return what to type for names that were given as one, with commas or spaces between them; "" elsewhere."""
+    """Return what to type where several names were given as one word, with commas or spaces between; else ""."""
     apart = re.split(r"[\s,;]+", " ".join(names).strip())
     return ": " + " ".join(f"`name` {one}" for one in apart) if len(apart) > len(names) else ""

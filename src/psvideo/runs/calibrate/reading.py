@@ -27,16 +27,16 @@ def rig_out(out: Path | str, *, force: bool) -> Path:
 
 
 def picture_beside(out: Path, *, force: bool) -> Path:
-    """Return where the picture beside a rig goes. Raises UsageError where it may not be replaced; one without a rig is
-    left of a calibration that failed, and is."""
+    """Return where the picture beside a rig goes. Raises UsageError where one is there that may not be replaced. One
+    that no rig stands beside is left over from a calibration that failed, and may."""
     path = out.with_suffix(".png")
     refuse_existing(path, force=force or not out.exists(), mark=PICTURE_MARK)
     return path
 
 
 def picture_of_failure(out: Path) -> Path:
-    """Return where the picture of a calibration that fails goes: beside a rig that stays, its own stays as well. Raises
-    UsageError where it may not be replaced."""
+    """Return where the picture of a calibration that fails goes: under a name of its own where a rig is there, which
+    keeps its picture. Raises UsageError where one is there that may not be replaced."""
     path = out.with_suffix(".failed.png" if out.exists() else ".png")
     refuse_existing(path, force=True, mark=PICTURE_MARK)
     return path

@@ -56,9 +56,12 @@ def frames_of(job: Job, numbers: range) -> tuple[int, ...]:
 
 
 def _solved_from(job: Job, number: int) -> int:
-    """Return the number of the first instant that the one with this number depends on: in the block of rounds before
-    its own, of which the two instants before know what moves (what moved in the first is not held); of an average, the
-    same of the average before."""
+    """Return the number of the first instant that the one with this number depends on.
+
+    It is pooled with its own block of rounds and the one before. What moves at the start of that block is known from
+    the two instants before it: in the first of these, nothing is known to move yet. Where results are averaged, all
+    this is so of the first instant of the average before.
+    """
     average = job.over_time.denoise
     if average > 1:
         number = (number // average - 1) * average

@@ -62,7 +62,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
 
 
 def note_timing(folder: Path, timing: Timing) -> None:
-    """Note the timing that all pieces go by, with what its file does not hold, unless one did before."""
+    """Note the timing that all pieces use, with what timing.json does not hold; what a piece noted before stays."""
     path = folder / FOLDER / TIMING
     if not path.is_file():
         beside = {name: getattr(timing, name) for name in BESIDE_TIMING}
@@ -83,7 +83,7 @@ def noted_timing(folder: Path) -> Timing | None:
 
 
 def note_subject(folder: Path, subject: Subject) -> None:
-    """Note what all pieces take the subject for, unless one did before."""
+    """Note what all pieces take the subject for; what a piece noted before stays."""
     path = folder / FOLDER / SUBJECT
     if not path.is_file():
         write_text(path, json.dumps({"reflectance": subject.reflectance, "metal": subject.metal}))
