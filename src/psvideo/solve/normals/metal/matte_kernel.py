@@ -32,21 +32,8 @@ def fill_matte(
     cosines, left, m, own = np.empty(lights), np.empty(lights), np.empty(6), np.empty(3)
     for p in range(len(normals)):
         x, y, z = normals[p, 0], normals[p, 1], normals[p, 2]
-        along, square, straight, faced, many = 0.0, TINY, 0.0, TINY, 0.0
-        for light in range(lights):
-            c, h = 0.0, 0.0
-            for i in range(3):
-                c += normals[p, i] * towards[light, p, i]
-                h += normals[p, i] * half[light, p, i]
-            shown = shown_by_lobes(numbers, c, h)[0]
-            cosines[light] = max(c, 0.0)
-            along += counts[light, p] * np.sqrt(shown * max(measured[light, p], 0.0))
-            square += counts[light, p] * shown
-            straight += shown_by_lobes(numbers, towards[light, p, 2], half[light, p, 2])[0]
-            faced += max(towards[light, p, 2], 0.0)
-            many += counts[light, p] if c > 0.0 else 0.0
-        scale = (along / square) ** 2
-        size = scale * straight / faced * max(z, LEAST_COSINE) ** LEANING
+        scale, facing, many = _scales(measured, counts, towards, half, normals, numbers, p, cosines)
+        size = facing * max(z, LEAST_COSINE) ** LEANING
         m[:], own[:] = 0.0, 0.0
         m[0] = m[3] = m[5] = 1e-9
         for light in range(lights):
@@ -75,3 +62,27 @@ def fill_matte(
             if counts[light, p] > 0.0 and cosines[light] > 0.0:
                 turned = own[0] * towards[light, p, 0] + own[1] * towards[light, p, 1] + own[2] * towards[light, p, 2]
                 matte[light, p] = size * max(cosines[light] + more * (left[light] - turned), 0.0)
+
+
+@FUSED.inlined
+def _scales(
+    measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, normals: Doubles, numbers: Doubles, p: int,
+    cosines: Doubles,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Fill a point's ``cosines`` to the lights, 0 behind it; return its scale of the lobes, the matte albedo that is as
+    bright as these are where a point faces the camera, and how many lights count that shine on it."""
+    along, square, straight, faced, many = 0.0, TINY, 0.0, TINY, 0.0
+    for light in range(len(measured)):
+        c, h = 0.0, 0.0
+        for i in range(3):
+            c += normals[p, i] * towards[light, p, i]
+            h += normals[p, i] * half[light, p, i]
+        shown = shown_by_lobes(numbers, c, h)[0]
+        cosines[light] = max(c, 0.0)
+        along += counts[light, p] * np.sqrt(shown * max(measured[light, p], 0.0))
+        square += counts[light, p] * shown
+        straight += shown_by_lobes(numbers, towards[light, p, 2], half[light, p, 2])[0]
+        faced += max(towards[light, p, 2], 0.0)
+        many += counts[light, p] if c > 0.0 else 0.0
+    scale = (along / square) ** 2
+    return scale, scale * straight / faced, many

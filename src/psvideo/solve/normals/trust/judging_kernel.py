@@ -28,8 +28,7 @@ def judge_rows(
     """
     n, a, f, d, out, kept = lent(normals), lent(albedo), lent(fit), lent(doubt), lent(error), lent(trusted)
     dim, wider = lent(spread.dim), lent(spread.wider)
-    channels, cols = len(a), out.shape[1]
-    share, shares, scale = ONE / np.float32(channels), lent(spread.shares), spread.scale * spread.scale
+    cols, shares, scale = out.shape[1], lent(spread.shares), spread.scale * spread.scale
     v, inverse = spread.variances, spread.inverse  # numbers outside the loops, which then become vectors
     read, photon, own, of_fit = v[0], v[1], v[2], v[3]
     tx, ty, tz = spread.toward[0], spread.toward[1], spread.toward[2]
@@ -58,17 +57,7 @@ def judge_rows(
         if near:
             _fill_between(ends[2], row, step, reaching)
             _fill_between(ends[3], row, step, turning)
-        sizes[:], means[:] = ZERO, TINY
-        for channel in range(channels):
-            counts_by = shares[channel] * share
-            for col in range(cols):
-                one = decoded(a[channel, row, col])
-                counted = one * counts_by
-                sizes[col] += one * counted
-                means[col] += counted
-        for col in range(cols):
-            means[col] = sizes[col] / means[col]  # what the channels are together, each counted as the solvers do
-            sizes[col] = np.sqrt(sizes[col])  # noise over it goes with the squares
+        _weigh_channels(a, row, shares, sizes, means)
         for col in range(cols):
             x, y, z = decoded(n[0, row, col]), decoded(n[1, row, col]), decoded(n[2, row, col])
             size = max(sizes[col] * reaching[col], TINY)
@@ -87,6 +76,24 @@ def judge_rows(
             solved = sizes[col] > ZERO
             out[row, col] = encoded(degrees if solved else ZERO, out)
             kept[row, col] = solved & (degrees <= limit)
+
+
+@FUSED.inlined
+def _weigh_channels(albedo: Samples, row: int, shares: Floats, sizes: Floats, means: Floats) -> None:
+    """Fill for a row what noise is divided by, ``sizes``, and what residuals are, ``means``: how large the channels of
+    albedo are together, each counted as the solvers do."""
+    share = ONE / np.float32(len(albedo))
+    sizes[:], means[:] = ZERO, TINY
+    for channel in range(len(albedo)):
+        counts_by = shares[channel] * share
+        for col in range(len(sizes)):
+            one = decoded(albedo[channel, row, col])
+            counted = one * counts_by
+            sizes[col] += one * counted
+            means[col] += counted
+    for col in range(len(sizes)):
+        means[col] = sizes[col] / means[col]
+        sizes[col] = np.sqrt(sizes[col])  # noise over it goes with the squares
 
 
 @FUSED.kept
