@@ -14,6 +14,7 @@ from psvideo.solve.normals.robust.reflectance_kernel import (
     fill_roughness_in_the_fit,
     solve_again,
 )
+from psvideo.solve.normals.robust.subject_points import ShownPoints
 from psvideo.solve.normals.task import FEW
 
 Array = NDArray[np.float64]
@@ -103,7 +104,8 @@ def test_parts_are_what_each_number_of_the_model_adds(
     rng: np.random.Generator, towards: Array, half: Array, to_camera: Array, g: Array, in_place: tuple[float, bool]
 ) -> None:
     measured, found = rng.random((LIGHTS, POINTS)), np.empty((7, LIGHTS, POINTS))
-    fill_parts(measured, towards, half, to_camera, g, TYPICAL, *in_place, found)
+    points = ShownPoints(measured, np.ones_like(measured), towards, half, to_camera)
+    fill_parts(points, g, TYPICAL, *in_place, found)
     np.testing.assert_allclose(found, parts_of(measured, towards, half, to_camera, g, in_place), rtol=1e-12, atol=1e-15)
 
 
@@ -147,7 +149,8 @@ def test_a_step_is_that_of_gauss_and_newton_with_cauchys_weights(
     measured = shown(rng, towards, half, to_camera, g, in_place)
     begun = g * rng.uniform(0.9, 1.1, g.shape)
     found = np.empty_like(g)
-    solve_again(measured, counts, towards, half, to_camera, begun, MODEL, TYPICAL, *in_place, found)
+    points = ShownPoints(measured, counts, towards, half, to_camera)
+    solve_again(points, begun, MODEL, TYPICAL, *in_place, found)
     for point in range(POINTS):
         one = measured[:, point], counts[:, point], towards[:, point], half[:, point], to_camera[point]
         np.testing.assert_allclose(found[point], stepped(*one, begun[point], in_place), rtol=1e-6, atol=1e-8)

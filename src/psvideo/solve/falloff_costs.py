@@ -57,19 +57,18 @@ def falloff_costs(
     of dark light. Shape (ratio, point): about 1 where a distance explains it, 0 where fewer lights than ``least_lit``,
     and not all, reach a point.
     """
-    from psvideo.solve.sweeping_kernel import sweep_points
+    from psvideo.solve.sweeping_kernel import SweptLamps, sweep_points
 
     field = near_field(lights, ground)
     x, y = every_ray(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
     rays = np.empty((*at.shape, 3))
     rays[..., 0], rays[..., 1], rays[..., 2] = x[:, ::step], y[::step], -1
     strengths = [float(np.mean(one.by_channel)) for one in lights]
-    lamps = np.stack([np.array(strengths), field.anisotropy, field.is_near.astype(np.float64)], axis=-1)
+    sent = np.stack([np.array(strengths), field.anisotropy, field.is_near.astype(np.float64)], axis=-1)
+    lamps = SweptLamps(field.positions_m, field.axes, sent)
     costs = np.empty((len(ratios), int(at.sum())))
-    sweep_points(
-        light[at], rays[at], depth_m[at], ratios, field.positions_m, field.axes, lamps,
-        min(least_lit, len(lights)), max(noise, LEAST), OWN_SHARE, costs,
-    )  # fmt: skip
+    fewest, noise = min(least_lit, len(lights)), max(noise, LEAST)
+    sweep_points(light[at], rays[at], depth_m[at], ratios, lamps, fewest, noise, OWN_SHARE, costs)
     return costs
 
 

@@ -1,5 +1,7 @@
 """The compiled loop of sweeping: how well every distance explains what near lights show in a point."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
@@ -11,19 +13,28 @@ ROUNDS = 4
 TINY = 1e-12
 
 
+class SweptLamps(NamedTuple):
+    """The lights: ``positions`` (light, 3) in metres, of a distant one its direction; ``axes`` (light, 3), the ways
+    they shine; and ``sent`` (light, 3), intensity, anisotropy, and 1 for a near light."""
+
+    positions: Doubles
+    axes: Doubles
+    sent: Doubles
+
+
 @FUSED.kept
 def sweep_points(
-    light: Doubles, rays: Doubles, plane_m: Doubles, ratios: Doubles, positions: Doubles, axes: Doubles,
-    lamps: Doubles, least_lit: int, noise: float, own: float, costs: Doubles,
+    light: Doubles, rays: Doubles, plane_m: Doubles, ratios: Doubles, lamps: SweptLamps, least_lit: int,
+    noise: float, own: float, costs: Doubles,
 ) -> None:  # fmt: skip
     """Fill ``costs`` (ratio, point): the mean of log(1 + r^2) over the lights that reach a point, r what the best
     normal leaves of their light in units of its error; 0 where too few do.
 
     light: (point, light), below 0 where it is not known. rays: (point, 3), to depth 1. plane_m: (point,), the depth of
-    ratio 1. positions: (light, 3), in metres, or a distant light's direction. lamps: (light, 3): intensity, anisotropy,
-    and 1 for a near light. least_lit: how many lights must reach a point. noise: of dark light; own: what else a
-    point's brightest light is off by, as a share.
+    ratio 1. least_lit: how many lights must reach a point. noise: of dark light; own: what else a point's brightest
+    light is off by, as a share.
     """
+    positions, axes, sends = lamps
     points, lights = light.shape
     vectors, weight, left = np.zeros((lights, 3)), np.zeros(lights), np.zeros(lights)
     for point in range(points):
@@ -38,14 +49,14 @@ def sweep_points(
         for n in range(len(ratios)):
             depth, mean = plane_m[point] * ratios[n], 0.0
             for k in range(lights):
-                x, y, z, sent = positions[k, 0], positions[k, 1], positions[k, 2], lamps[k, 0]
-                if lamps[k, 2] > 0:
+                x, y, z, sent = positions[k, 0], positions[k, 1], positions[k, 2], sends[k, 0]
+                if sends[k, 2] > 0:
                     x, y, z = x - depth * rays[point, 0], y - depth * rays[point, 1], z - depth * rays[point, 2]
                     away = np.sqrt(x * x + y * y + z * z)
                     x, y, z = x / away, y / away, z / away
                     sent /= away * away
-                    if lamps[k, 1] > 0:
-                        sent *= max(-(x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]), LEAST_COSINE) ** lamps[k, 1]
+                    if sends[k, 1] > 0:
+                        sent *= max(-(x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]), LEAST_COSINE) ** sends[k, 1]
                 vectors[k, 0], vectors[k, 1], vectors[k, 2] = x * sent, y * sent, z * sent
                 mean += sent / lights
                 weight[k] = 1.0 if light[point, k] > 6 * noise else 0.0

@@ -8,6 +8,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Doubles
 from psvideo.solve.normals.robust.point_sums import add_square, along_way, solve_symmetric
+from psvideo.solve.normals.robust.subject_points import ShownPoints
 from psvideo.solve.normals.task import FEW
 
 LEAST_FACING = 0.05
@@ -55,14 +56,12 @@ def _size_and_normal(g: Doubles, point: int, normal: Doubles) -> float:
 
 
 @FUSED.kept
-def fill_parts(
-    measured: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles, typical: float,
-    power: float, on_paint: bool, parts: Doubles,
-) -> None:  # fmt: skip
+def fill_parts(points: ShownPoints, g: Doubles, typical: float, power: float, on_paint: bool, parts: Doubles) -> None:
     """Fill ``parts`` (part, light, point): what was measured, in albedos, and what each number of the model adds.
 
     A ``power`` above 0 puts a lobe h^power in softness' place, in shares of the albedo where ``on_paint``, else
     whatever the albedo."""
+    measured, _, towards, half, to_camera = points
     normal = np.empty(3)
     for p in range(len(g)):
         size = _size_and_normal(g, p, normal)
@@ -99,11 +98,11 @@ def _typical(rest: Doubles, counts: Doubles, point: int, order: Doubles) -> floa
 
 @FUSED.kept
 def solve_again(
-    measured: Doubles, counts: Doubles, towards: Doubles, half: Doubles, to_camera: Doubles, g: Doubles,
-    model: Doubles, typical: float, power: float, on_paint: bool, found: Doubles,
-) -> None:  # fmt: skip
+    points: ShownPoints, g: Doubles, model: Doubles, typical: float, power: float, on_paint: bool, found: Doubles
+) -> None:
     """Fill ``found`` with g (point, 3) after a step of reweighted Gauss and Newton under the model, ``power`` and
     ``on_paint`` as in ``fill_parts``."""
+    measured, counts, towards, half, to_camera = points
     lights, soft = len(measured), 0.0 if power > 0.0 else model[2]
     normal, matrix, right = np.empty(3), np.empty(6), np.empty(3)
     rows, matte, rest, order = np.empty((lights, 3)), np.empty(lights), np.empty(lights), np.empty(lights)

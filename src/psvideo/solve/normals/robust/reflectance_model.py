@@ -98,7 +98,7 @@ def parts_of(points: SubjectPoints, g: Doubles, typical: float, in_place: InPlac
     from psvideo.solve.normals.robust.reflectance_kernel import fill_parts
 
     parts = np.empty((1 + NUMBERS, *points.measured.shape))
-    fill_parts(points.measured, points.towards, points.half, points.to_camera, g, typical, *in_place, parts)
+    fill_parts(points.shown, g, typical, *in_place, parts)
     return parts
 
 
@@ -157,6 +157,5 @@ def _solved_again(points: SubjectPoints, g: Doubles, model: Doubles, typical: fl
     from psvideo.solve.normals.robust.reflectance_kernel import solve_again
 
     found = np.empty_like(g)
-    ways = points.towards, points.half, points.to_camera
-    solve_again(points.measured, points.counts, *ways, g, model, typical, *in_place, found)
+    solve_again(points.shown, g, model, typical, *in_place, found)
     return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,6 +10,16 @@ from psvideo.model.arrays import Doubles, Mask
 
 LEAST_POINTS = 50
 """To fewer no model is fitted."""
+
+
+class ShownPoints(NamedTuple):
+    """What compiled loops take of ``SubjectPoints``."""
+
+    measured: Doubles
+    counts: Doubles
+    towards: Doubles
+    half: Doubles
+    to_camera: Doubles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +40,11 @@ class SubjectPoints:
     half: Doubles
     to_camera: Doubles
     normals: Doubles
+
+    @property
+    def shown(self) -> ShownPoints:
+        """What the lights show of them."""
+        return ShownPoints(self.measured, self.counts, self.towards, self.half, self.to_camera)
 
     def only(self, known: Mask) -> "SubjectPoints":
         """Return some of the points."""
