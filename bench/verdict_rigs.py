@@ -25,7 +25,7 @@ from psvideo.report.judge.of_exposure import exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_validity import validity
-from psvideo.report.judge.typical_error import off_deg
+from psvideo.report.judge.typical_error import likely_deg
 from psvideo.report.judgement import verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
@@ -159,7 +159,7 @@ def judged(case: Case, claimed: np.ndarray) -> Judged:
     lines = [*exposure(observed), *lamps(observed), ambient(observed), *rig(observed)]
     both = surface.measured & case.mask
     off = float(angles_deg(surface.normals[both], case.truth[both]).mean()) if both.any() else 90.0
-    return Judged(verdict_of([*lines, *accuracy(observed), *validity(observed)]), off, off_deg(observed) or 0.0)
+    return Judged(verdict_of([*lines, *accuracy(observed), *validity(observed)]), off, likely_deg(observed) or 0.0)
 
 
 def _plan(names: tuple[str, ...], rows: int, cols: int) -> Plan:

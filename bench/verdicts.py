@@ -193,7 +193,7 @@ def _figures(subject: Subject, report: RunReport, out: Path) -> tuple[str, bool]
     """Return what is true of the result, in words, and whether what the report says of the rig agrees."""
     facts = report.instants[0]
     said = f"{100 * (facts.valid_share or 0):.0f} % trusted"
-    deg = None if facts.misfit is None else MEAN_OF_HELD * facts.misfit.error_deg
+    deg = None if facts.likely_deg is None else MEAN_OF_HELD * facts.likely_deg
     said += "" if deg is None else f", said to be off by {deg:.1f}°"
     if subject.truth is None:
         return said, True

@@ -17,10 +17,9 @@ from psvideo.solve.normals.illumination import illumination
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
-from psvideo.solve.normals.trust.judging import Judging
-from psvideo.solve.normals.trust.judging import _typical as typical
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
+from psvideo.solve.normals.trust.usual_errors import UsualErrors
 from psvideo.solve.sweeping import RATIOS, swept
 from psvideo.solve.sweeping import _averaged as averaged
 from psvideo.solve.sweeping import _costs as swept_costs
@@ -248,8 +247,9 @@ def test_what_is_typical_is_that_of_places_whose_distance_is_known() -> None:
     doubt_deg[:, :4], errors_deg[:, :4] = 6, 20
 
     def found(limit_deg: float) -> Misfit:
-        near, how = NearSpread(dim=whole, wider=whole, doubt_deg=doubt_deg), Judging(most_error_deg=limit_deg)
-        return typical(Misfit(share=0.01, error_deg=9.0), points, errors_deg, none, near, how)
+        near = NearSpread(dim=whole, wider=whole, doubt_deg=doubt_deg)
+        usual = UsualErrors.of(points, errors_deg, none, near, most_deg=limit_deg)
+        return usual.misfit(Misfit(share=0.01, error_deg=9.0))
 
     assert (found(5).error_deg, found(5).distance_share) == pytest.approx((1.0, 0.4))
     assert (found(7).error_deg, found(7).distance_share) == pytest.approx((0.4 * 20 + 0.6, 0.0))

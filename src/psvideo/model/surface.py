@@ -129,6 +129,9 @@ class Surface:
     slope_deg
         By how many degrees a typical normal is turned as albedo that goes with the slope shows it, which paint does
         not: a sheen, haze, a lamp of another strength. 0 where nobody looked for it.
+    likely_deg
+        How far off a typical normal is likely to be beyond noise, as a standard error, by what is predicted and how the
+        lights stand: what a report says of the picture. None where nothing shows it, as under three lights.
     shadows_lit
         Whether light from other surfaces is seen in the subject's shadows, 0 to 1; 0 where nobody looked for it.
     distances
@@ -149,6 +152,7 @@ class Surface:
     misfit: Misfit | None = None
     source: NDArray[np.uint8] | None = None
     slope_deg: float = 0.0
+    likely_deg: float | None = None
     shadows_lit: float = 0.0
     distances: Distances | None = None
 

@@ -1,6 +1,7 @@
 """Judgements on how far off a typical normal is by more than noise, and on near lights' distance."""
 
 from collections.abc import Iterator, Sequence
+from math import inf
 
 from psvideo.report.judge.of_strengths import other_strengths
 from psvideo.report.judge.rig_by_plates import OF_FOUR, OF_MORE
@@ -10,6 +11,7 @@ from psvideo.report.judge.typical_error import (
     by_noise_deg,
     by_slope_deg,
     distance_unknown_share,
+    likely_deg,
     moves,
     off_deg,
     rig_explains,
@@ -58,9 +60,9 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
         )
     if error_deg is None or error_deg < by_noise_deg(observed.facts):  # what noise hides cannot be told from it
         return
-    amount = f"about {error_deg:.0f} degrees" if error_deg > 1.5 else "no more than about a degree"
-    found = f"Beyond noise, a typical normal is off by {amount}"
-    if error_deg <= COMMON_DEG * (MOVING_FACTOR if moves(observed.facts) else 1):
+    common_deg = COMMON_DEG * (MOVING_FACTOR if moves(observed.facts) else 1)
+    found = f"Beyond noise, a typical normal is off by {_amount(error_deg, observed, common_deg)}"
+    if error_deg <= common_deg:
         yield Judgement(subject="accuracy", grade="good", found=f"{found}.")
         return
     cause, advice = _why_off(observed)
@@ -80,10 +82,20 @@ def off_by_albedo(observed: Observed) -> Judgement | None:
     return Judgement(
         subject="accuracy",
         grade="bad" if slope_deg > LOST_DEG else "doubtful",
-        found=f"A typical normal is off by about {slope_deg:.0f} degrees: albedo {GOES_WITH_SLOPE}"
+        found=f"A typical normal is off by {_amount(slope_deg, observed, COMMON_DEG)}: albedo {GOES_WITH_SLOPE}"
         f"{_or_directions(observed)}.",
         advice=f'{BESIDE_THE_OTHERS}; normals with `aov=["error"]` say how far off each pixel may be.',
     )
+
+
+def _amount(error_deg: float, observed: Observed, common_deg: float) -> str:
+    """Say how far off a typical normal is likely to be, within the borders of the grade that its error has."""
+    borders_deg = (common_deg, LOST_DEG, inf)
+    begins_deg = max((border for border in borders_deg if border < error_deg), default=0.0)
+    ends_deg = min(border for border in borders_deg if border >= error_deg)
+    likely = likely_deg(observed)
+    amount_deg = error_deg if likely is None else min(max(likely, begins_deg), ends_deg)
+    return f"about {amount_deg:.0f} degrees" if amount_deg > 1.5 else "no more than about a degree"
 
 
 def _or_directions(observed: Observed) -> str:

@@ -35,6 +35,13 @@ def off_deg(observed: Observed) -> float | None:
     return MEAN_OF_HELD * float(np.median(known)) if known else None
 
 
+def likely_deg(observed: Observed) -> float | None:
+    """Return how far off a typical normal is likely to be beyond noise, in the mean; None where nothing says so. Grades
+    go by ``off_deg``, which is more under lights that stand far apart: it is never far too small."""
+    known = [one.likely_deg for one in observed.facts if one.likely_deg is not None]
+    return MEAN_OF_HELD * float(np.median(known)) if known else None
+
+
 def by_noise_deg(facts: Sequence[InstantFacts]) -> float:
     """Return by how much noise turns a typical normal, in the mean; 0 where nothing says so."""
     known = [one.misfit.noise_deg for one in facts if one.misfit is not None]

@@ -48,7 +48,8 @@ class InstantFacts:
     followed has a share and no speed. ``moving_valid_share`` is which share is valid of what moves and three lights
     reach, moving shadows too; None where hardly anything does.
     ``misfit`` is what the robust solver found common to the whole picture, ``slope_deg`` by how much typical normals
-    are turned as albedo that goes with the slope shows it.
+    are turned as albedo that goes with the slope shows it, ``likely_deg`` how far off they are likely to be beyond
+    noise, None where nothing shows it.
     """
 
     number: int
@@ -68,6 +69,7 @@ class InstantFacts:
     measured_share: float | None = None
     moving_valid_share: float | None = None
     slope_deg: float = 0.0
+    likely_deg: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +184,7 @@ def instant_facts(
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
         slope_deg=0.0 if surface is None else surface.slope_deg,
+        likely_deg=None if surface is None else surface.likely_deg,
         moving_valid_share=None if some is None or stirs is None else _moving_valid(some, subject, stirs),
     )
 

@@ -9,7 +9,7 @@ from psvideo.model.surface import Misfit, Reflectance
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.steadiness import Change
 
-_FIXED = Struct("=qI18d")
+_FIXED = Struct("=qI19d")
 """A round's number, of how many lights there are levels, and what it has one number for; NaN is what is not known."""
 
 
@@ -65,7 +65,7 @@ def _packed(one: InstantFacts) -> bytes:
         found = one.misfit
         misfit = (found.share, found.error_deg, found.noise_deg, found.distance_share)
     known = (one.valid_share, one.ambient, one.speed_px_s, one.moving_share, one.measured_share,
-             one.moving_valid_share)  # fmt: skip
+             one.moving_valid_share, one.likely_deg)  # fmt: skip
     fixed = _FIXED.pack(
         one.number,
         len(one.levels),
@@ -84,8 +84,8 @@ def _packed(one: InstantFacts) -> bytes:
 
 def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
     number, count, time_s, clipped_share, unseen_share, borrowed_share, slope_deg, *rest = _FIXED.unpack_from(packed)
-    valid, ambient, speed_px_s, moving, measured, held = (None if isnan(value) else value for value in rest[:6])
-    change, misfit = rest[6:9], rest[9:]
+    valid, ambient, speed_px_s, moving, measured, held, likely = (None if isnan(value) else value for value in rest[:7])
+    change, misfit = rest[7:10], rest[10:]
     lights = memoryview(packed)[_FIXED.size :].cast("d")
     return InstantFacts(
         number=number,
@@ -96,6 +96,7 @@ def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
         unseen_share=unseen_share,
         borrowed_share=borrowed_share,
         slope_deg=slope_deg,
+        likely_deg=likely,
         change=None
         if isnan(change[0])
         else Change(normals_deg=change[0], albedo_percent=change[1], level_percent=change[2]),

@@ -14,5 +14,6 @@ a model of the subject would turn normals under four and five lights), and ``unc
 real surfaces, and show hardly anywhere; and how well few lights check each other; ``hidden_share``: how much of what is
 not matte lights hide altogether). Loops of the signs are in ``signs_kernel``. ``doubting`` says how much each counts,
 and makes one doubt of them; its loop is ``doubting_kernel``. ``doubts`` are those of several looks at what stands
-still, and ``repeats`` shows by them how large noise is that detail does not show.
+still, and ``repeats`` shows by them how large noise is that detail does not show. ``usual_errors`` are those that are
+typical of a picture, for what is said of it as a whole.
 """

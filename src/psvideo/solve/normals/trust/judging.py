@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import let_go, lie_in_files
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Floats, Mask
-from psvideo.model.surface import MEASURED, Misfit, Surface
+from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise
@@ -22,12 +22,13 @@ from psvideo.solve.normals.trust.agreeing import Agreeing, agreeing
 from psvideo.solve.normals.trust.doubting import Doubting, doubt_deg
 from psvideo.solve.normals.trust.doubts import Doubt, Doubts
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, at_points, moved_deg, moving_doubt_deg, stirring
-from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
+from psvideo.solve.normals.trust.near_spread import near_spread
 from psvideo.solve.normals.trust.noise_spread import NoiseSpread, Spreading
 from psvideo.solve.normals.trust.repeats import Repeat
 from psvideo.solve.normals.trust.signs import Signs, signs_of
 from psvideo.solve.normals.trust.thin_surface import ThinSurface, every_nth
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
+from psvideo.solve.normals.trust.usual_errors import UsualErrors, usual
 from psvideo.solve.normals.trust.witness import checked
 
 
@@ -48,9 +49,6 @@ class Judging:
     spreading: Spreading = field(default_factory=Spreading)
     doubting: Doubting = field(default_factory=Doubting)
     moving: MovingDoubt = field(default_factory=MovingDoubt)
-
-
-MOST_USUAL_DEG = 30.0
 
 
 def judged(
@@ -77,8 +75,12 @@ def judged(
     shown = doubts.mean
     errors = spread.judged(points.surface, np.stack([shown.doubt_deg, shown.usual_deg]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit
-    if misfit is not None and points.known.any():
-        misfit = _typical(misfit, points, errors, np.hypot(points.noise_deg, shown.lost_deg), near, how)
+    likely_deg = None
+    if len(one.plates) > ALL_EXPLAINED and points.known.any():
+        by_noise_deg = np.hypot(points.noise_deg, shown.lost_deg)
+        typical = UsualErrors.of(points, errors, by_noise_deg, near, most_deg=how.most_error_deg)
+        likely_deg = typical.likely_deg(one.lit, plain=misfit is None)
+        misfit = None if misfit is None else typical.misfit(misfit)
     doubt = shown.doubt_deg if moving is None else moving.beside(shown.doubt_deg)
     turned = None if moving is None or one.arc_deg is None else _at_points(one.arc_deg, points.known.shape)
     for more in (turned, near.doubt_deg if near.doubt_deg.size else None, one.metal_deg):
@@ -87,9 +89,17 @@ def judged(
     error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
     if one.moved and one.moves is not None and one.moves.any():
         trusted |= _trusted_moving(error, one.moves, how.most_moving_error_deg)
-    slope_deg = _usual(shown.by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
+    slope_deg = usual(shown.by_slope_deg, points.brightness * points.known)  # what is bright shows more of the subject
     lit = shown.shadows_lit
-    return replace(surface, valid=trusted, error_deg=error, misfit=misfit, slope_deg=slope_deg, shadows_lit=lit), doubts
+    return replace(
+        surface,
+        valid=trusted,
+        error_deg=error,
+        misfit=misfit,
+        slope_deg=slope_deg,
+        likely_deg=likely_deg,
+        shadows_lit=lit,
+    ), doubts
 
 
 def _at_points(plane: Floats, shape: tuple[int, ...]) -> Floats:
@@ -156,31 +166,6 @@ def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise) -> Surfac
 
     over_ranges(add, rows, each=BAND_PIXELS // cols)
     return surface
-
-
-def _typical(
-    misfit: Misfit, points: ThinSurface, at_points: Floats, by_noise_deg: Floats, near: NearSpread, how: Judging
-) -> Misfit:
-    """Return the misfit with what is typical of the points' errors, as far as distances are known."""
-    albedo = points.brightness * points.known  # what is bright shows more of the subject
-    unknown = np.zeros_like(points.known)
-    if near.doubt_deg.size:
-        unknown = points.known & (near.doubt_deg > how.most_error_deg)
-    if not unknown.all(where=points.known):
-        albedo = albedo * ~unknown
-    typical, by_noise = (_usual(each, albedo) for each in (at_points, by_noise_deg))
-    return replace(
-        misfit,
-        error_deg=float(np.sqrt(max(typical**2 - by_noise**2, 0.0))),
-        noise_deg=by_noise,
-        distance_share=float(np.count_nonzero(unknown) / np.count_nonzero(points.known)),
-    )
-
-
-def _usual(errors_deg: Floats, weights: Floats) -> float:
-    """Return the mean error; where hardly anything is known it counts as MOST_USUAL_DEG."""
-    each = np.minimum(errors_deg.astype(np.float32), np.float32(MOST_USUAL_DEG))
-    return float((each * weights).sum(dtype=np.float64) / max(float(weights.sum(dtype=np.float64)), 1e-12))
 
 
 def _thin_shape(surface: Surface, one: Evidence) -> tuple[int, int]:
