@@ -41,15 +41,10 @@ TYPICAL_OF_MEDIAN = 1.48
 def by_colour_deg(points: ThinSurface, lit: Illumination, known: Mask) -> Floats:
     """Return by how many degrees normals are turned by what their surface mirrors, as far as colour shows it, (row,
     col) of the points, of which these ``known`` speak for the subject; zeros for a grey one, and for grey pictures."""
-    nothing = np.zeros(known.shape, np.float32)
-    if points.surface.albedo.ndim == 2 or not known.any():
-        return nothing
-    squares = blurred(known.astype(np.float32), FINE)
-    planes = np.moveaxis(points.surface.albedo, -1, 0).astype(np.float32)
-    colours = np.stack([_mean(plane, known, FINE, squares) for plane in planes])
-    white = paleness(colours, known)
+    colours = _mean_colours(points, known, FINE)
+    white = None if colours is None else paleness(colours, known)
     if white is None:
-        return nothing
+        return np.zeros(known.shape, np.float32)
     across, along = spread_across_and_along(points, lit, known)
     turned = np.degrees(white) * np.sqrt(across / np.maximum(along, np.float32(1e-12)))
     around = np.maximum(_mean(turned * turned, known, width_of(known, AROUND)), 0)  # running sums end below nothing
@@ -87,12 +82,9 @@ def paleness(colours: Floats, known: Mask) -> Floats | None:
 def painted(points: ThinSurface, known: Mask, width: int) -> Floats:
     """Return how far colour lies beside the subject's own and white, (row, col), means over squares of so many points:
     nothing that a surface mirrors goes there, only other paint. As far as the subject is coloured, else zeros."""
-    nothing = np.zeros(known.shape, np.float32)
-    if points.surface.albedo.ndim == 2 or not known.any():
+    nothing, colours = np.zeros(known.shape, np.float32), _mean_colours(points, known, width)
+    if colours is None:
         return nothing
-    squares = blurred(known.astype(np.float32), width)
-    planes = np.moveaxis(points.surface.albedo, -1, 0).astype(np.float32)
-    colours = np.stack([_mean(plane, known, width, squares) for plane in planes])
     colours /= np.maximum(colours.mean(axis=0), np.float32(1e-6))
     own = np.array([median(plane[known]) for plane in colours])
     coloured = float(np.linalg.norm(1 - own))
@@ -114,6 +106,15 @@ def spread_across_and_along(points: ThinSurface, lit: Illumination, known: Mask)
     along = np.einsum("irc,ij,jrc->rc", points.planes, spread, points.planes)
     across = np.maximum(np.float32(np.trace(spread)) - along, np.float32(0))
     return np.maximum(across, _mean(across, known, points.widths[0])), along
+
+
+def _mean_colours(points: ThinSurface, known: Mask, width: int) -> Floats | None:
+    """Return the mean albedo of known points over squares, (3, row, col); None of grey pictures, or where none is."""
+    if points.surface.albedo.ndim == 2 or not known.any():
+        return None
+    squares = blurred(known.astype(np.float32), width)
+    planes = np.moveaxis(points.surface.albedo, -1, 0).astype(np.float32)
+    return np.stack([_mean(plane, known, width, squares) for plane in planes])
 
 
 def _mean(plane: Floats, known: Mask, width: int, squares: Floats | None = None) -> Floats:
