@@ -15,7 +15,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from psvideo.compute.ranks import median, quantile, rising_parts
+from psvideo.compute.ranks import quantile, rising_parts
 from psvideo.model.arrays import Doubles, Flags, Image
 from psvideo.model.camera import Camera
 from psvideo.model.channels import mean_of_channels
@@ -23,6 +23,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
+from psvideo.plates.ambient.lee1980 import without_noise
 
 WINDOW_FRAMES = 128
 """Frames that one regression takes together: enough for plates within a few per cent of the best."""
@@ -41,8 +42,6 @@ MOVED = 4.0
 """A block moved whose residuals are this many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
 """Residuals of less than this, and this share of the block's light, are no motion, however little noise there is."""
-WINDOW_PX = 5
-"""Detail of the ambient picture is judged against its noise over windows of this width (Lee 1980)."""
 AROUND_BLOCKS = 3.0
 """What moved takes the light of blocks around it, weighted by a Gaussian of this standard deviation."""
 
@@ -145,7 +144,7 @@ def separated(
     step = MOSAIC if mosaic else 1
     for row, col in np.ndindex(step, step):
         own = np.s_[row::step, col::step]
-        plane = _without_noise(np.ascontiguousarray(total[own]), np.ascontiguousarray(noise[own]))
+        plane = without_noise(np.ascontiguousarray(total[own]), np.ascontiguousarray(noise[own]))
         earlier = None if before is None else (before.image[own], before.stood)
         total[own] = _guessed(plane, stood, earlier)
     return Separated(begins=design.frames[0], image=total, stood=stood, known=design.known)
@@ -191,24 +190,6 @@ def _noise_by_level(variance: Image, level: Image) -> Image:
     slope, offset = np.polyfit(levels, quiet, 1) if np.ptp(levels) > 1e-4 else (0.0, float(quiet.mean()))
     floor = max(float(quiet.min()), 1e-12)
     return np.asarray(np.maximum(max(slope, 0.0) * level + offset, floor), np.float32)
-
-
-def _without_noise(image: Image, noise: Image) -> Image:
-    """Keep as much of the local detail as its variance exceeds ``noise``'s (row, col), plane by plane (Lee 1980)."""
-    if image.ndim == 2:
-        return _lee(image, noise)
-    planes = [np.ascontiguousarray(image[..., channel]) for channel in range(image.shape[2])]
-    return np.stack([_lee(plane, noise) for plane in planes], axis=2)
-
-
-def _lee(plane: Image, noise: Image) -> Image:
-    bend = plane[:, 2:] - 2 * plane[:, 1:-1] + plane[:, :-2]
-    most = float((1.4826 * median(np.abs(bend[::3]))) ** 2 / 6) if bend.size else 0.0  # with fine detail in it
-    window = (WINDOW_PX, WINDOW_PX)
-    mean = cv2.blur(plane, window)
-    spread = np.maximum(cv2.blur(plane * plane, window) - mean * mean, 0)
-    kept = np.maximum(spread - np.minimum(noise, np.float32(most)), 0) / np.maximum(spread, 1e-12)
-    return np.asarray(mean + kept * (plane - mean), np.float32)
 
 
 def _guessed(image: Image, stood: Flags, before: tuple[Image, Flags] | None) -> Image:
