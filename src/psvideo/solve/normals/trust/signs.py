@@ -122,9 +122,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     misfit_deg, likely_deg = roots(squares, surroundings)
     uneven = np.zeros_like(noise)
     if plain and lights > 3:
-        changing_deg, _ = roots(_changes(points, noise, lights - 3), surroundings)
-        share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
-        uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
+        uneven = _uneven(misfit_deg, roots(_changes(points, noise, lights - 3), surroundings)[0])
     torn_deg, likely_torn_deg = torn_angles_deg(points, misfit_deg, uneven, one.lit.view, one.plates[0].shape)
     unseen, added = 0.0, tuple[Added, ...]()
     if by_slope and not one.moved:  # what was not followed goes with it too
@@ -172,6 +170,12 @@ def _beyond_noise(points: ThinSurface, wider: Floats) -> tuple[Floats, Floats, F
         line(shown),
     )  # fmt: skip
     return squares, noise, shown
+
+
+def _uneven(misfit_deg: Floats, changing_deg: Floats) -> Floats:
+    """Return how far a misfit is a codec's, 0 to 1, by how much of it changes from sample to sample."""
+    share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
+    return np.asarray(np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1), np.float32)
 
 
 def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
