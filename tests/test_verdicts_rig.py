@@ -24,6 +24,7 @@ from psvideo.model.turn import CLOCKWISE, UPRIGHT
 from psvideo.report.judge import of_accuracy, of_validity
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judge.rig_by_lean import SHOWN_BY_PLATES
 from psvideo.report.judge.rig_by_plates import other_curve
 from psvideo.report.judge.rig_of_three import STRONGER, turned_deg
 from psvideo.report.judgement import verdict_of
@@ -94,7 +95,7 @@ def test_where_near_lights_do_not_say_how_far_the_subject_is_the_rig_is_not_blam
 @pytest.mark.parametrize(("moving_share", "doubted"), [(0.0, True), (0.3, False)])
 def test_normals_that_lean_while_the_picture_moves_say_nothing_of_the_rig(moving_share: float, doubted: bool) -> None:
     """Of a subject that stops and goes most rounds are at rest, and the one that was looked at may not be."""
-    one = Footage(solved=True).observed(0)
+    one = Footage(solved=True, claimed_deg=4).observed(0)
     turn_deg = (12.0, 9.0, -8.0)
     one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=turn_deg, rest_deg=18.0, moving_share=moving_share)]
     assert any("tilted otherwise" in line.found for line in rig_of(one)) == doubted
@@ -105,7 +106,7 @@ def test_normals_that_change_from_result_to_result_doubt_a_rig_only_where_leanin
     change_deg: float, gain: float, doubted: bool
 ) -> None:
     """Normals of a right rig, of a still life in H.264, changed by 1.4 degrees and leaned by 9 at a gain of 0.2."""
-    one = Footage(solved=True).observed(0)
+    one = Footage(solved=True, claimed_deg=4).observed(0)
     one.closely.leans[:] = [Lean(lean_deg=9.2, gain=gain, turn_deg=(0.5, 1.7, 0.3), rest_deg=8.9)]
     change = Change(normals_deg=change_deg, albedo_percent=1.3, level_percent=0.0)
     one.facts = KeptFacts(replace(facts, change=change) for facts in one.facts)
@@ -404,8 +405,8 @@ def test_a_rig_that_is_off_and_not_yet_doubted_is_not_called_right(fault: dict[s
 
 
 @pytest.mark.parametrize(("gain", "named"), [(1.4, True), (1.6, False)])
-@pytest.mark.parametrize(("lights", "own", "by_rig", "tells"), [(3, 0.0, 0.0, False), (5, 0.02, 0.0, False),
-    (5, 0.004, 0.0, True), (5, 0.02, 0.035, True)])  # fmt: skip
+@pytest.mark.parametrize(("lights", "own", "by_rig", "tells"), [(3, 0.0, 0.0, False), (5, 0.02, 0.012, False),
+    (5, 0.004, 0.012, True), (5, 0.02, 0.035, True)])  # fmt: skip
 def test_gloss_is_named_beside_the_rig_where_lights_do_not_tell_which_makes_normals_lean(
     lights: int, own: float, by_rig: float, tells: bool, gain: float, named: bool
 ) -> None:
@@ -418,6 +419,34 @@ def test_gloss_is_named_beside_the_rig_where_lights_do_not_tell_which_makes_norm
     (line,) = (each for each in rig_of(one) if each.grade != "good")
     assert ("tell gloss from a wrong rig" in line.found) == (named and not tells)
     assert line.grade == ("doubtful" if lights == 5 or gain < 1.5 else "bad")
+
+
+@pytest.mark.parametrize(("lights", "by_rig", "rest_deg", "doubted"), [(5, 0.009, 18.0, False), (5, 0.011, 18.0, True),
+    (5, 0.0, 2.0, True), (4, 0.009, 18.0, False), (3, 0.0, 18.0, True)])  # fmt: skip
+def test_lights_that_are_each_wrong_in_a_way_of_their_own_leave_some_of_the_light(
+    lights: int, by_rig: float, rest_deg: float, doubted: bool
+) -> None:
+    """Plates that fit the rig say so, unless three lights explain all, or the rig is turned as a whole."""
+    one = Footage(shape="waves", lights=lights, solved=True).observed(0)
+    one.closely.leans[:] = [Lean(lean_deg=20.0, gain=1.6, turn_deg=(20.0, 0.0, 0.0), rest_deg=rest_deg)]
+    if (fit := one.rig_fit) is not None:
+        left = replace(fit, typical_own=0.001, misfit=float(np.hypot(0.001, by_rig)), near=None, curves=None)
+        one._fit = (len(one.light_at_points), one.firing.tobytes()), left
+    assert any("normals are not those of one surface" in line.found for line in rig_of(one)) == doubted
+
+
+@pytest.mark.parametrize("shape", ["ball", "waves"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_directions_that_are_a_few_degrees_off_leave_more_of_the_light_than_excuses_a_lean(
+    shape: str, seed: int
+) -> None:
+    for lights in (5, 6, 8):
+        right, wrong = (
+            Footage(shape=shape, lights=lights, claimed_deg=deg, solved=True).observed(seed).rig_fit for deg in (0, 4)
+        )
+        assert right is not None
+        assert wrong is not None
+        assert right.by_rig < SHOWN_BY_PLATES < wrong.by_rig
 
 
 @pytest.mark.parametrize(("times", "said"), [(0.5, True), (0.6, False)])
