@@ -159,6 +159,16 @@ def test_few_frames_behind_many_dark_ones_are_counted_and_not_said_to_come_again
         timing_from_rows(plan, np.arange(frames), profiles)
 
 
+def test_frames_in_the_dark_are_no_light_that_shrinks_by_nothing() -> None:
+    """Where nine tenths are dark they may be of a dark subject, and stay: "light ... by 0 %" was said of them."""
+    plan, profiles, true_s = begun_late(light=1.0, frames=90, late=81, lights=3, seed=0)
+    timing = timing_from_rows(plan, np.arange(90), profiles)
+    found_s = np.array([flash.start_s for flash in timing.flashes if flash.lit])
+    assert np.abs(true_s[:, None] - found_s).min(axis=0).max() < 0.5 * plan.camera.row_time_s
+    assert timing.swing is None
+    assert not any("by 0 %" in note for note in timing.notes)
+
+
 def test_frames_that_noise_alone_parts_are_quiet_only_where_they_are_dark(plan: Plan) -> None:
     """Lights that are alike leave a global shutter's frames alike, too, and brighter than those that a flash splits."""
     rng = np.random.default_rng(6)

@@ -127,6 +127,8 @@ def swing_of(plan: Plan, found: ClipFit) -> Swing | None:
             comes = cause == "lamps" and share > SLOWLY_AT_MOST
             if (moves or comes) and not _abrupt(flashes):
                 return None
+            if share == 0.0:  # some give none at all, which are named as black or unfired
+                return None
             return Swing(share=share, cause="either" if moves else cause)
     return None
 
