@@ -91,7 +91,7 @@ def _between_nan(pictures: NDArray[np.float32]) -> list[NDArray[np.float32]]:
 def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_seen: bool, smooth: bool) -> None:
     rng = np.random.default_rng(8)
     source, guess = _sources(smooth, rng)
-    velocity = _velocity(smooth, rng)
+    velocities = _velocity(smooth, rng), _velocity(smooth, rng)
     lights = _between_nan(rng.choice([0.02, 0.4, 0.89], (2, ROWS, COLS, channels)).astype(np.float32))
     some = 0.97 if smooth else 0.2
     marks = [rng.choice([0, BESIDE, CLIPPED], (ROWS, COLS), p=[some, *[(1 - some) / 2] * 2]) for _ in lights]
@@ -106,7 +106,7 @@ def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_se
         for n in range(2)
     )
     blend_rows(
-        source, guess, velocity, (ROWS, COLS), FIRST, LEFT, RIGHT, *columns_in(COLS, COARSE[1]),
+        source, guess, *velocities, (ROWS, COLS), FIRST, LEFT, RIGHT, *columns_in(COLS, COARSE[1]),
         np.zeros((ROOM, max(COLS, 3 * EIGHT)), np.float32), before, after, np.float32(FULL[2]), rows_seen, stays,
         image, seen,
     )  # fmt: skip
@@ -117,9 +117,10 @@ def test_a_band_is_what_single_pixels_make_it(channels: int, clips: bool, all_se
         for col in range(LEFT, RIGHT):
             coarse_y, coarse_x = (FIRST + row + 0.5) / high, (col + 0.5) / wide
             what, given = (codes[int(coarse_y), int(coarse_x)] for codes in (guess, source))
-            go_x, go_y = (_linear(plane, coarse_x - 0.5, coarse_y - 0.5) for plane in velocity.astype(np.float64))
             counted, known, expected = {}, bool(seen_before[row, col]), stays[row, col].astype(np.float64)
             for n, other in enumerate((AFTER, BEFORE)):
+                planes = velocities[n].astype(np.float64)
+                go_x, go_y = (_linear(plane, coarse_x - 0.5, coarse_y - 0.5) for plane in planes)
                 x, y = col - SPANS_S[n] * go_x * wide, FIRST + row - SPANS_S[n] * go_y * high
                 there = seen_in[n][_within(round(y), len(seen_in[n])), _within(round(x), seen_in[n].shape[1])]
                 if what not in (other, AT_REST, NOWHERE) and rows_seen[row] and there:
@@ -152,7 +153,7 @@ def test_nothing_before_or_behind_a_plate_is_read() -> None:
     for down in (-0.1, 0.1):  # of some eight pixels only columns are skipped or come twice
         velocity = np.stack([across, np.full(COARSE, down)]).astype(np.float32)
         blend_rows(
-            source, source, velocity, (ROWS, COLS), 0, 0, COLS, *columns_in(COLS, COARSE[1]),
+            source, source, velocity, velocity, (ROWS, COLS), 0, 0, COLS, *columns_in(COLS, COARSE[1]),
             np.zeros((ROOM, COLS), np.float32), before, after, one, np.ones(ROWS, np.bool_), image, image, seen,
         )  # fmt: skip
         assert image.max() < 0.45  # what is no number is cut off at 1, of which each plate counts a half

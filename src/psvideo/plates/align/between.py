@@ -174,7 +174,8 @@ def _filled(
     seen[some] = own.pixels_seen[some]
     if not part:
         return own.picture.rows(band)
-    rows = [None if side is None else side.around(band, motion.velocity) for side in sides]
+    ways = [motion.velocity if side is None else motion.mean_velocity(side.span_s) for side in sides]
+    rows = [None if side is None else side.around(band, way) for side, way in zip(sides, ways, strict=True)]
     stays = next(one for one in rows if one is not None and one.side.plate is own).of(band)
     image = np.empty(stays.shape, np.float32)
     for beside in (slice(0, part.start), slice(part.stop, None)):
@@ -183,7 +184,7 @@ def _filled(
     before, after = [_absent(image) if one is None else one.arrays(total) for one in rows]
     room = np.zeros((ROOM, max(own.shape[1], 3 * EIGHT)), np.float32)
     blend_rows(
-        sources[0], sources[1], motion.velocity, (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
+        sources[0], sources[1], ways[0], ways[1], (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
         columns, shares, room, before, after, np.float32(own.saturation), np.ascontiguousarray(own.rows_seen[some]),
         _flat(stays), _flat(image), seen[some],
     )  # fmt: skip

@@ -24,10 +24,10 @@ from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, 
 
 Columns = NDArray[np.uintp]
 HALF = np.float32(0.5)
-ROOM = 9
-"""Lines that a row is made with: of the velocity's two planes two coarse rows each, of places two for each plate, and
+ROOM = 13
+"""Lines that a row is made with: of two velocities' two planes two coarse rows each, of places two for each plate, and
 a line of zeros."""
-FIRST_PLACES, NOTHING = 4, 8
+FIRST_PLACES, NOTHING = 8, 12
 
 
 @FUSED.called
@@ -109,8 +109,8 @@ def _blends_eight(one: SideArrays, two: SideArrays, what: int, at: int, stride: 
 
 @FUSED.kept
 def blend_rows(
-    source: Codes8, guess: Codes8, velocity: Floats, shape: tuple[int, int], first: int, left: int, right: int,
-    columns: Columns, shares: Floats, room: Floats, before: SideArrays, after: SideArrays, full: np.float32,
+    source: Codes8, guess: Codes8, since: Floats, until: Floats, shape: tuple[int, int], first: int, left: int,
+    right: int, columns: Columns, shares: Floats, room: Floats, before: SideArrays, after: SideArrays, full: np.float32,
     rows_seen: Flags, stays: Floats, image: Floats, seen: Flags,
 ) -> None:  # fmt: skip
     """Fill ``image`` (row, col, channel), the rows of a picture of a ``shape`` (row, col) from its row ``first`` on,
@@ -118,14 +118,16 @@ def blend_rows(
 
     ``source`` and ``guess``, of coarse pixels, say what is taken and what is shown: AT_REST (as in ``stays``, rows as
     those of the image), BEFORE, AFTER, BOTH or NOWHERE; outside the columns ``left`` to ``right`` nothing moves.
-    ``velocity`` (2, row, col) is that of coarse pixels, per second. ``columns`` (2, col) and ``shares`` (col,) are the
+    ``since`` and ``until`` (2, row, col) are the mean velocities of coarse pixels from the plate before
+    and to the one after, per second. ``columns`` (2, col) and ``shares`` (col,) are the
     picture's columns among the coarse ones, as ``columns_in`` has them; ``room`` (ROOM, col) is to work in.
 
     Clipped light becomes ``full``: where one of two plates is clipped, the one that counts more is taken alone; what
     both count is 1. ``rows_seen`` (row,) says where anything may be known of what is moved, and ``seen`` (row, col)
     becomes False where nothing is; there the image stays.
     """
-    own, other, flow, made, known = lent(source), lent(guess), lent(velocity), lent(image), lent(seen)
+    own, other, made, known = lent(source), lent(guess), lent(image), lent(seen)
+    came, goes = lent(since), lent(until)
     one, two, kept, rows_known, lines = lent_side(before), lent_side(after), lent(stays), lent(rows_seen), lent(room)
     high, wide = np.float32(shape[0]) / np.float32(own.shape[0]), np.float32(shape[1]) / np.float32(own.shape[1])
     lefts, owns, beyond = lent(columns)[0, left:right], lent(columns)[1], lent(shares)[left:right]
@@ -142,13 +144,16 @@ def blend_rows(
         for coarse in (top, below):
             if coarse != (odd if coarse & 1 else even):
                 for plane in range(2):
-                    _stretch(flow[plane, coarse], lefts, beyond, lines[2 * plane + (coarse & 1), left:right])
+                    line = 2 * plane + (coarse & 1)
+                    _stretch(came[plane, coarse], lefts, beyond, lines[line, left:right])
+                    _stretch(goes[plane, coarse], lefts, beyond, lines[4 + line, left:right])
                 even, odd = (even, coarse) if coarse & 1 else (coarse, odd)
         for plane in range(2):
             start, each, scale = (np.float32(left), ONE, wide) if plane == 0 else (y, ZERO, high)
-            above, under = lines[2 * plane + (top & 1), left:right], lines[2 * plane + (below & 1), left:right]
             early_at, late_at = (one.right, two.right) if plane == 0 else (one.down, two.down)
+            above, under = lines[2 * plane + (top & 1), left:right], lines[2 * plane + (below & 1), left:right]
             _places(above, under, down, scale, start + early_at, each, one.span_s, ways[plane, left:right])
+            above, under = lines[4 + 2 * plane + (top & 1), left:right], lines[4 + 2 * plane + (below & 1), left:right]
             _places(above, under, down, scale, start + late_at, each, two.span_s, ways[2 + plane, left:right])
         for begin in range(left, right, EIGHT):
             end = min(begin + EIGHT, right)

@@ -17,7 +17,7 @@ from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.velocity.all_lights import FINE_PX, WINDOW_PX, AllLights
 from psvideo.plates.align.velocity.brightness import light_of
 from psvideo.plates.align.velocity.flow import Sketch
-from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, odd_width
+from psvideo.plates.align.velocity.followed import Followed, Pair, mean_over, mean_velocity, odd_width
 from psvideo.plates.align.velocity.moving import GROWN, GROWN_PX
 from psvideo.plates.align.velocity.moving_kernel import moved_rows
 
@@ -39,7 +39,7 @@ LEAST = np.float32(1e-3)
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Left:
+class SurfaceLeft:
     """What no surface explains along a ``velocity``, over a ``wide`` and a ``fine`` window, 0 to 1, and where enough is
     lit to tell, ``known``; all (row, col)."""
 
@@ -48,17 +48,17 @@ class _Left:
     fine: Floats
     known: Flags
 
-    def least(self, other: "_Left") -> "_Left":
+    def least(self, other: "SurfaceLeft") -> "SurfaceLeft":
         """Return the least that two velocities leave; known is what is along both."""
         wide, fine = np.minimum(self.wide, other.wide), np.minimum(self.fine, other.fine)
         return replace(self, wide=wide, fine=fine, known=self.known & other.known)
 
-    def copied(self) -> "_Left":
+    def copied(self) -> "SurfaceLeft":
         """Return a copy to ``take`` into."""
         planes = [one.copy() for one in (self.velocity, self.wide, self.fine)]
-        return _Left(velocity=planes[0], wide=planes[1], fine=planes[2], known=self.known.copy())
+        return SurfaceLeft(velocity=planes[0], wide=planes[1], fine=planes[2], known=self.known.copy())
 
-    def take(self, other: "_Left", where: Flags) -> None:
+    def take(self, other: "SurfaceLeft", where: Flags) -> None:
         """Take another velocity where it leaves less."""
         better = where & other.known & ((other.wide < self.wide) | ~self.known)
         for own, theirs in ((self.velocity, other.velocity), (self.wide, other.wide), (self.fine, other.fine)):
@@ -67,12 +67,24 @@ class _Left:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlateNear:
+    """A plate near an instant: its ``codes`` (row, col), ``span_s``, the time from it to the instant, below 0 where it
+    comes after it, and what it ``counts`` in the mean of a light's plates."""
+
+    codes: Codes8
+    span_s: float
+    counts: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class BySurface:
-    """Of every light, the number of its pair of plates, or the ``standing`` sketch under which nothing moves; and what
-    no normal and albedo explain of all lights, ``odd`` (some, light): orthonormal rows."""
+    """Of every light, the number of its pair of plates, or the ``standing`` sketch under which nothing moves; how
+    a normal times its albedo lights them, ``matrix`` (light, 3); and what no such normal explains of all lights,
+    ``odd`` (some, light): orthonormal rows."""
 
     places: tuple[int | None, ...]
     standing: tuple[Codes8 | None, ...]
+    matrix: Doubles
     odd: Doubles
 
     @classmethod
@@ -87,29 +99,31 @@ class BySurface:
         whites = np.array([sketch.white for sketch in given if sketch is not None])
         order = list(pairs)
         still = {name: sketch.codes for name, sketch in others.items() if sketch is not None}
+        matrix = lamps.matrix / whites[:, None]
         return cls(
             places=tuple(order.index(name) if name in pairs else None for name in lamps.names),
             standing=tuple(still.get(name) for name in lamps.names),
-            odd=np.linalg.svd(lamps.matrix / whites[:, None])[0][:, 3:].T,
+            matrix=matrix,
+            odd=np.linalg.svd(matrix)[0][:, 3:].T,
         )
 
     def chosen(self, lights: AllLights, proposals: Sequence[Floats], found: Followed, still: Flags) -> Followed:
         """Return what was ``found`` with velocities of the ``proposals`` where these bring plates to one surface, and
         what was found does not. What is ``still`` (row, col) stays."""
-        none = self._left(lights, np.zeros_like(found.velocity))
-        before = none.least(self._left(lights, found.velocity)) if found.moves.any() else none
+        none = self.left(lights, np.zeros_like(found.velocity))
+        before = none.least(self.left(lights, found.velocity, found.bend)) if found.moves.any() else none
         asked = before.known & ~still & (before.wide > MARGIN)
         if not asked.any():
             return found
         best = none.copied()
         for velocity in proposals:
-            best.take(self._left(lights, velocity), asked)
+            best.take(self.left(lights, velocity, found.bend), asked)
         taken, size = _clearly(best, before) & asked, odd_width(GROWN_PX, lights.step)
         for _ in range(AROUND):
             if not taken.any():
                 return found
             around, near = _near(best.velocity, taken, size)
-            best.take(self._left(lights, near), asked & (around > FEW))
+            best.take(self.left(lights, near, found.bend), asked & (around > FEW))
             taken = _clearly(best, before) & asked
         velocity = np.where(taken, best.velocity, found.velocity)
         joined = self._joined(lights, velocity, taken, (before, found), still)
@@ -123,7 +137,7 @@ class BySurface:
         )
 
     def _joined(
-        self, lights: AllLights, velocity: Floats, taken: Flags, given: tuple[_Left, Followed], still: Flags
+        self, lights: AllLights, velocity: Floats, taken: Flags, given: tuple[SurfaceLeft, Followed], still: Flags
     ) -> Flags:
         """Return what is ``taken`` with what goes along with it; put that one's ``velocity`` in."""
         (before, found), size = given, odd_width(GROWN_PX, lights.step)
@@ -131,7 +145,7 @@ class BySurface:
         least = [AS_UNLIKE * lights.mean(unlike, window) for window in (WINDOW_PX, FINE_PX)]
         for _ in range(GROWN):
             around, near = _near(velocity, taken, size)
-            unlike, left = lights.unlike(near), self._left(lights, near)
+            unlike, left = lights.unlike(near), self.left(lights, near, found.bend)
             joins = (around > MOST) & ~still & ~taken
             joins &= (lights.mean(unlike, WINDOW_PX) < least[0]) & (lights.mean(unlike, FINE_PX) < least[1])
             joins &= ~(left.known & before.known) | ((left.wide <= before.wide) & (left.fine <= before.fine))
@@ -139,13 +153,13 @@ class BySurface:
             taken = taken | joins
         return taken
 
-    def _left(self, lights: AllLights, velocity: Floats) -> _Left:
-        """Return what no surface explains along a velocity; of large pictures every second one in rows and columns is
-        asked, as flow is no finer there."""
+    def left(self, lights: AllLights, velocity: Floats, bend: Floats | None = None) -> SurfaceLeft:
+        """Return what no surface explains along a velocity and its bend; of large pictures every second one in rows
+        and columns is asked, as flow is no finer there."""
         stride, shape = lights.step, lights.shape
 
         def shown(light: int, _: int) -> Floats:
-            return self._light(lights, light, velocity, stride)
+            return self._light(lights, light, (velocity, bend), stride)
 
         light = np.stack(over_ranges(shown, len(self.places), each=1))
         mean = light.mean(axis=0)
@@ -166,27 +180,52 @@ class BySurface:
             full(np.divide(over(share, px), np.maximum(over(lit, px), LEAST), dtype=np.float32))
             for px in (WINDOW_PX, FINE_PX)
         )
-        return _Left(velocity=velocity, wide=wide, fine=fine, known=full(over(lit, WINDOW_PX)) > KNOWN)
+        return SurfaceLeft(velocity=velocity, wide=wide, fine=fine, known=full(over(lit, WINDOW_PX)) > KNOWN)
 
-    def _light(self, lights: AllLights, light: int, velocity: Floats, stride: int) -> Floats:
-        """Return a light's two plates along a velocity, mixed by how near they are, as shares of white (row, col)."""
+    def normals(self, lights: AllLights, velocity: Floats, bend: Floats | None = None) -> Floats:
+        """Return the normals, times their albedo, of what plates show along a velocity, (row, col, 3); of large
+        pictures they are as fine as flow."""
+
+        def shown(light: int, _: int) -> Floats:
+            return self._light(lights, light, (velocity, bend), lights.step)
+
+        light = np.stack(over_ranges(shown, len(self.places), each=1))
+        pulls = np.linalg.pinv(self.matrix).astype(np.float32)
+        normals = np.stack([np.einsum("l,lrc->rc", pull, light) for pull in pulls], axis=-1)
+        return np.asarray(cv2.resize(normals, lights.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+
+    def plates(self, lights: AllLights, light: int) -> list[PlateNear]:
+        """Return a light's plates around the instant: two, or the one under which nothing moves."""
         place, codes = self.places[light], self.standing[light]
         if place is None:
             if codes is None:
                 raise ValueError("a light has neither plates nor a sketch")
-            still = cv2.resize(codes, lights.shape[::-1], interpolation=cv2.INTER_AREA)[::stride, ::stride]
+            return [PlateNear(codes=codes, span_s=0.0, counts=1.0)]
+        since_s, until_s = (float(span) for span in lights.spans_s[place])
+        late = min(max(since_s / (since_s + until_s), 0.0), 1.0)
+        before, after = lights.codes[place]
+        return [
+            PlateNear(codes=before, span_s=since_s, counts=1 - late),
+            PlateNear(codes=after, span_s=-until_s, counts=late),
+        ]
+
+    def _light(self, lights: AllLights, light: int, ways: tuple[Floats, Floats | None], stride: int) -> Floats:
+        """Return a light's two plates along a velocity and its bend, mixed by how near they are, as shares of white
+        (row, col)."""
+        plates, (velocity, bend) = self.plates(lights, light), ways
+        if len(plates) == 1:
+            size = lights.shape[::-1]
+            still = cv2.resize(plates[0].codes, size, interpolation=cv2.INTER_AREA)[::stride, ::stride]
             return light_of(still.astype(np.float32))
-        since_s, until_s = lights.spans_s[place]
-        late = np.clip(since_s / (since_s + until_s), np.float32(0), np.float32(1))
         total = np.zeros([-(-length // stride) for length in lights.shape], np.float32)
-        for plate, span_s, weight in zip(lights.codes[place], (since_s, -until_s), (1 - late, late), strict=True):
-            out = np.empty_like(total)
-            moved_rows(plate, np.float32(span_s), velocity, stride, 0, len(out), out)
-            total += np.float32(weight) * light_of(out)
+        for plate in plates:
+            out, way = np.empty_like(total), mean_velocity(velocity, bend, plate.span_s)
+            moved_rows(plate.codes, np.float32(plate.span_s), way, stride, 0, len(out), out)
+            total += np.float32(plate.counts) * light_of(out)
         return total
 
 
-def _clearly(best: _Left, before: _Left) -> Flags:
+def _clearly(best: SurfaceLeft, before: SurfaceLeft) -> Flags:
     clear = best.wide < np.minimum(LEFT * before.wide, before.wide - MARGIN)
     return np.asarray(clear & (best.fine < FINE_LEFT * before.fine))
 

@@ -33,11 +33,13 @@ from psvideo.plates.align.light_history import Around, DueInstant, Held
 from psvideo.plates.align.own_ways import along_own_ways
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
+from psvideo.plates.align.rigid.with_bodies import with_bodies
 from psvideo.plates.align.shake.steadied import Steadied, steady_at
+from psvideo.plates.align.velocity.all_lights import AllLights
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
-from psvideo.plates.align.velocity.moving import followed_at
+from psvideo.plates.align.velocity.moving import Choosing, followed_at
 from psvideo.plates.align.velocity.moving_kernel import BOTH, NOWHERE
 from psvideo.plates.align.velocity.own_flow import OwnFlow
 from psvideo.plates.light_plate import LightPlate
@@ -208,7 +210,7 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
         by_light = {light: steady.pair(pair) for light, pair in _pairs_of(held, instant).items()}
     lights, pairs = [*by_light], [*by_light.values()]
     by_surface = BySurface.of(held.lamps, by_light, _standing(held, instant))
-    choose = None if by_surface is None else by_surface.chosen
+    choose = None if by_surface is None else _choosing(by_surface)
     motion = followed_at(pairs, instant.time_s, others=len(held.lights) - len(lights), choose=choose)
     instant.motion = motion
     if steady is not None:
@@ -240,6 +242,15 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
         _hand_on(instant, plate)
         instant.moving.remove(light)
         held.let_go()
+
+
+def _choosing(surface: BySurface) -> Choosing:
+    """Return what chooses between velocities by the surface: of bodies that turn, and then piece by piece."""
+
+    def choose(lights: AllLights, proposals: Sequence[Floats], found: Followed, still: Flags) -> Followed:
+        return surface.chosen(lights, proposals, with_bodies(surface, lights, found, still), still)
+
+    return choose
 
 
 def _standing(held: Held, instant: DueInstant) -> dict[str, Sketch | None]:
