@@ -181,6 +181,14 @@ def test_frames_that_noise_alone_parts_are_quiet_only_where_they_are_dark(plan: 
     assert loud_part(laid_out(plan, dark)) == slice(0, 40), "another picture"
 
 
+@pytest.mark.parametrize("dark", [0, 17, 30])
+def test_where_noise_is_all_that_changes_nothing_is_left_out(plan: Plan, dark: int) -> None:
+    """Also where one step parts the dark from the lit: either end then is noise up to the other."""
+    value = np.random.default_rng(2).normal(0, 1e-3, (40, 48))
+    value[dark:] += 0.3
+    assert loud_part(laid_out(plan, value)) == slice(0, 40)
+
+
 def test_a_picture_comes_again_where_frames_of_one_time_show_it(plan: Plan) -> None:
     """A strobe in step with the frames, with four of them a round, while the subject turns; then noise in its place."""
     rng = np.random.default_rng(7)

@@ -12,6 +12,7 @@ Rooms, from the bottom up:
 
 - ``velocity``: where things move, found from all lights together
 - ``doubt``: by how much a plate may be off because the two that it comes from do not match
+- ``rigid``: how bodies move that turn, along ways that are curved
 - ``shake``: where the picture is as a whole at every flash, where the camera shakes
 
 ``own_ways`` makes, for eyes, what no common motion explains between two plates.

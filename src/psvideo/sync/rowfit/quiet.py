@@ -32,9 +32,9 @@ def loud_part(rows: Profiles) -> slice:
     none are, or where nothing else shows."""
     value = rows.binned(ROWS).value
     first, count = _quiet_first(value), len(value)
-    if first == count:
-        return slice(0, count)
     last = _quiet_first(value[::-1])
+    if first + last >= count:
+        return slice(0, count)
     loud = value[first : count - last]
     first = first if _is_dark(value[:first], loud) else 0
     last = last if _is_dark(value[count - last :], loud) else 0
