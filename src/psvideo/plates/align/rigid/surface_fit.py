@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Doubles, Flags, Floats
 from psvideo.plates.align.by_surface import CLIPPED, LEAST_LIT, MATTE
 from psvideo.plates.align.rigid.rigid_motion import BodyPoints, RigidMotion
+from psvideo.plates.align.velocity.followed import mean_velocity
 
 ROUNDS, DONE = 20, 0.005
 """Steps at most; a step by less than the second, in a unit of every number, is the last."""
@@ -113,7 +114,7 @@ def _left(motion: RigidMotion, seen: InPicture, lights: Sequence[AroundInstant],
     light = np.zeros((len(lights), 3, seen.row.size), np.float32)
     for own, around in zip(light, lights, strict=True):
         for picture, span_s, counts in zip(around.pictures, around.spans_s, around.counts, strict=True):
-            way = np.float32(span_s) * (velocity - np.float32(span_s / 2) * bend)
+            way = np.float32(span_s) * mean_velocity(velocity, bend, span_s)
             there = _shown(picture, seen.row - way[1], seen.col - way[0])
             own += there * np.array([[counts], [-counts * span_s], [-counts * span_s]], np.float32)
     mean = np.maximum(light[:, 0].mean(axis=0), LEAST_LIT)
