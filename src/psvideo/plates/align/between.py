@@ -76,7 +76,7 @@ def plate_at(
     sources, columns = (source, source if guess is None else guess), columns_in(cols, source.shape[1])
 
     def fill(top: int, bottom: int) -> None:
-        packing.put(top, _filled(range(top, bottom), seen, own, sides, sources, motion, *columns))
+        packing.put(top, _filled(range(top, bottom), seen, own, sides, sources, *columns))
 
     over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
@@ -94,13 +94,15 @@ def plate_at(
 
 @dataclass(frozen=True, kw_only=True)
 class _Side:
-    """A plate, of whose picture only those rows are made that move into a band, what it counts where both plates are
-    taken, and what lies well within what was seen, by rows, (row, 1) or (1, col), or by pixels; (1, 1) where that is
-    everywhere. The whole picture is ``right`` and ``down`` of where it is to be, in pixels."""
+    """A plate, of whose picture only those rows are made that move into a band; the mean ``velocity`` from it to the
+    instant, or back; what it counts where both plates are taken, and what lies well within what was seen, by rows,
+    (row, 1) or (1, col), or by pixels; (1, 1) where that is everywhere. The whole picture is ``right`` and ``down`` of
+    where it is to be, in pixels."""
 
     plate: LightPlate
     read: Reader
     span_s: float
+    velocity: Floats
     counts: np.float32
     within: Flags
     right: float
@@ -110,20 +112,22 @@ class _Side:
     def of(cls, plate: LightPlate, motion: Followed, counts: float, shift: tuple[float, float]) -> "_Side":
         own = plate.own.astype(np.uint8)
         within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)).reshape(own.shape) > 0
+        span_s = motion.time_s - plate.time_s
         return cls(
             plate=plate,
             read=plate.picture.reader(),
-            span_s=motion.time_s - plate.time_s,
+            span_s=span_s,
+            velocity=motion.mean_velocity(span_s),
             counts=np.float32(counts),
             within=np.ones((1, 1), np.bool_) if within.all() else within,
             right=shift[0] * plate.shape[1],
             down=shift[1] * plate.shape[0],
         )
 
-    def around(self, band: range, velocity: Floats) -> "_Rows":
+    def around(self, band: range) -> "_Rows":
         """Return the plate's rows of a band, and those that move into it."""
-        rows, high = self.plate.shape[0], self.plate.shape[0] / velocity.shape[1]
-        some = velocity[1, max(int(band.start / high) - 1, 0) : int(band.stop / high) + 2]
+        rows, high = self.plate.shape[0], self.plate.shape[0] / self.velocity.shape[1]
+        some = self.velocity[1, max(int(band.start / high) - 1, 0) : int(band.stop / high) + 2]
         ways = self.span_s * high * np.array([some.min(), some.max(), 0], np.float64) - self.down
         first = max(math.floor(band.start - ways.max()) - MARGIN_ROWS, 0)
         last = min(math.ceil(band.stop - ways.min()) + MARGIN_ROWS, rows)
@@ -165,7 +169,6 @@ def _filled(
     own: LightPlate,
     sides: Sequence[_Side | None],
     sources: tuple[Codes8, Codes8],
-    motion: Followed,
     columns: NDArray[np.uintp],
     shares: Floats,
 ) -> Image:
@@ -174,8 +177,8 @@ def _filled(
     seen[some] = own.pixels_seen[some]
     if not part:
         return own.picture.rows(band)
-    ways = [motion.velocity if side is None else motion.mean_velocity(side.span_s) for side in sides]
-    rows = [None if side is None else side.around(band, way) for side, way in zip(sides, ways, strict=True)]
+    rows = [None if side is None else side.around(band) for side in sides]
+    known = [side.velocity for side in sides if side is not None]
     stays = next(one for one in rows if one is not None and one.side.plate is own).of(band)
     image = np.empty(stays.shape, np.float32)
     for beside in (slice(0, part.start), slice(part.stop, None)):
@@ -184,7 +187,7 @@ def _filled(
     before, after = [_absent(image) if one is None else one.arrays(total) for one in rows]
     room = np.zeros((ROOM, max(own.shape[1], 3 * EIGHT)), np.float32)
     blend_rows(
-        sources[0], sources[1], ways[0], ways[1], (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
+        sources[0], sources[1], known[0], known[-1], (own.shape[0], own.shape[1]), band.start, part.start, part.stop,
         columns, shares, room, before, after, np.float32(own.saturation), np.ascontiguousarray(own.rows_seen[some]),
         _flat(stays), _flat(image), seen[some],
     )  # fmt: skip
