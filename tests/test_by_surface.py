@@ -5,21 +5,20 @@ import math
 import cv2
 import numpy as np
 import pytest
+from sketched_pairs import pairs_around, sketched
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.model.rig import Light
 from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.by_surface import BySurface
-from psvideo.plates.align.velocity.flow import Sketch, sketch_of
+from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
-from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import mixture_of
 
-SHAPE, COUNT, RADIUS_PX, ROUND_S = (160, 192), 4, 62.0, 1.0
+SHAPE, COUNT, RADIUS_PX = (160, 192), 4, 62.0
 TURN_PER_S = math.radians(20)
 """How fast the ball turns about its upright axis."""
-FLASHES_S = ROUND_S / (COUNT + 1) * (np.arange(COUNT) - (COUNT - 1) / 2)
+FLASHES_S = 1 / (COUNT + 1) * (np.arange(COUNT) - (COUNT - 1) / 2)
 HEIGHT = math.radians(45)
 
 
@@ -54,19 +53,12 @@ def seen(light: int, time_s: float, turns: bool) -> Sketch:
     shaded = paint(TURN_PER_S * time_s * turns) * np.maximum(normals @ direction, 0)
     noise = np.random.default_rng([light, int(1e4 * (time_s + 9))]).normal(0, 0.002, SHAPE)
     image = np.asarray(np.where(inside, shaded, 0.3 * direction[2]) + noise, np.float32)
-    rows = np.ones(SHAPE[0], np.bool_)
-    plate = LightPlate(light=f"l{light}", number=0, time_s=time_s, picture=mixture_of(image), seen=rows)
-    return sketch_of(plate, white=0.9)
+    return sketched(image, light, time_s)
 
 
 def pairs(turns: bool = True) -> dict[str, Pair]:
     """Every light's plates before and after the instant 0."""
-    found = {}
-    for light, at_s in enumerate(FLASHES_S):
-        first_s = at_s - ROUND_S * (at_s > 0)
-        ends = seen(light, first_s, turns), seen(light, first_s + ROUND_S, turns)
-        found[f"l{light}"] = Pair(before=ends[0], after=ends[1])
-    return found
+    return pairs_around(lambda light, time_s: seen(light, time_s, turns), FLASHES_S)
 
 
 def known(turned: int = 0) -> Lamps:
