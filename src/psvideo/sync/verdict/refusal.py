@@ -27,7 +27,7 @@ SHOWN = 0.05
 """Rounds with less than this share of the brightest one's light show nothing."""
 MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
 """No two clocks are further apart than this, errors of short clips included."""
-FILM_ON = "Film on while the strobe plays; if it did, open the lens, raise the gain, or bring the lights nearer."
+FILM_ON = "Film on while the strobe flashes. If it flashed, open the lens, raise the gain, or bring the lights nearer."
 LEAST_ROWS = 2
 """Rows of which the time from one to the next can be asked for at all."""
 
