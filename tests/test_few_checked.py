@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from ring_and_ball import ring
 
 from psvideo.model.surface import MEASURED, Misfit, Reflectance, Surface
+from psvideo.report.judge.typical_error import MEAN_OF_HELD
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust import few_checked, signs
+from psvideo.solve.normals.trust.by_other_rig import LeftOver, left_by_other_rig
 
 Array = NDArray[np.float64]
 SIZE = 72
@@ -147,8 +149,62 @@ def test_the_model_turns_normals_by_about_what_they_are_off_by() -> None:
 def test_softness_leaves_less_by_its_own_weights_and_evenly(
     soft: tuple[float, float], others: tuple[float, float], least: float, most: float
 ) -> None:
-    held = few_checked.much_less_left(few_checked.LeftOver(*soft), few_checked.LeftOver(*others))
+    held = few_checked.much_less_left(LeftOver(*soft), LeftOver(*others))
     assert least <= held <= most
+
+
+def wax(c: Array, _: Array) -> Array:
+    return 0.5 * (0.85 * c + 0.15)
+
+
+def turned_each(ways: Array, wrong_deg: float, seed: int) -> Array:
+    """Directions that are off by so much, each its own way."""
+    across = np.cross(ways, np.random.default_rng(seed).normal(size=ways.shape))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return np.asarray(np.cos(np.radians(wrong_deg)) * ways + np.sin(np.radians(wrong_deg)) * across)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4, 6])
+def test_lights_on_a_ring_that_are_a_little_off_pass_for_no_softness(seed: int) -> None:
+    normals, inside = ball()
+    ways = ring(4, 35)
+    claimed = under(turned_each(ways, 2, seed))
+    found = Solving(error=True).solve(shot(normals, ways, matte), claimed, mask=inside)
+    assert found.likely_deg is not None
+    here = inside & found.measured
+    off = angles_deg(found.normals, normals)[here].mean()
+    assert 0.67 * off < MEAN_OF_HELD * found.likely_deg < 2.5 * off
+
+
+def test_softness_counts_beside_lights_that_stand_otherwise() -> None:
+    found, off = solved(wax)
+    assert found.error_deg is not None
+    here = np.asarray(found.source == MEASURED)
+    assert off[here].mean() > 4
+    assert found.error_deg[here].mean() > 0.5 * off[here].mean()
+
+
+def test_other_lights_leave_little_of_what_a_rig_that_is_off_leaves_and_much_of_gloss() -> None:
+    normals, inside = ball()
+    some = (normals[inside] @ FOUR.T > 0.15).all(axis=1)
+    truth = normals[inside][some][::7]
+
+    def left(measured: Array, claimed: Array) -> LeftOver:
+        g = np.linalg.lstsq(claimed, measured, rcond=None)[0].T
+        points = SubjectPoints(
+            measured=measured,
+            counts=np.ones_like(measured),
+            seen=np.ones_like(measured),
+            towards=np.repeat(claimed[:, None], len(truth), axis=1),
+            half=np.repeat(claimed[:, None], len(truth), axis=1),
+            to_camera=np.broadcast_to(UP, truth.shape),
+            normals=g / np.linalg.norm(g, axis=1, keepdims=True),
+        )
+        return left_by_other_rig(points, g)
+
+    assert max(left(FOUR @ truth.T, turned_each(FOUR, 3, 2))) < 0.02
+    half = (FOUR + UP) / np.linalg.norm(FOUR + UP, axis=1, keepdims=True)
+    assert left(0.5 * FOUR @ truth.T + 0.2 * (half @ truth.T) ** 20, FOUR).evenly > 0.3
 
 
 def test_angles_around_are_means_of_a_gaussian() -> None:

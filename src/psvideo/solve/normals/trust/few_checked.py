@@ -5,7 +5,7 @@ much the model that fits all of the subject would turn them says how far they ma
 """
 
 from dataclasses import replace
-from typing import NamedTuple, get_args
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -25,6 +25,7 @@ from psvideo.solve.normals.robust.reflectance_fit import (
 )
 from psvideo.solve.normals.robust.reflectance_model import ROUGH, SOFT, Kind, Sought, alternated, explained_evenly
 from psvideo.solve.normals.robust.subject_points import LEAST_POINTS, SubjectPoints, sizes_of
+from psvideo.solve.normals.trust.by_other_rig import LeftOver, left_by_other_rig
 
 FEWEST_LIGHTS = 4
 """Three lights leave nothing that a model could explain."""
@@ -38,20 +39,18 @@ ENOUGH_LESS = 0.3
 LESS_EVENLY, CLEARLY_EVENLY = 0.96, 0.06
 """So much less than the others must softness leave where all measurements count alike, and counts wholly over 1 and the
 second of it: what fits by the weights of one fit alone is a sheen on a subject that moves."""
+AS_RIG, THAN_RIG, LEAST_BY_RIG = 1.2, 2.0, 0.003
+"""A model counts wholly where it leaves up to so many times what other lights would, and not at all from the second
+number on; these leave the third share at least, as noise does. Of wax and clay a model leaves 0.02 to 1.3 times as
+much, of what shines under a right rig 0.01 to 1.2; of what is matte, under lights 2 and 5 degrees off, 3 to 40 times,
+though it explains two thirds: lights nearly on a ring can hardly tell softness, and a little of a rig passes for much
+of it."""
 TURNS = 2
 """How often model and normals follow each other: four times cost twice as much and say the same."""
 AROUND = 0.07
 """Angles are means around a point, Gaussian of this standard deviation, as a share of the subject's size."""
 FAR = 1e-3
 """Where points are farther than that, the mean of all of them counts, as this much of one."""
-
-
-class LeftOver(NamedTuple):
-    """Which share of the squares a model leaves, ``weighted`` as its fit weighs them, and ``evenly`` where all count
-    alike."""
-
-    weighted: float
-    evenly: float
 
 
 def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) -> Floats | None:
@@ -85,14 +84,15 @@ def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) ->
 def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
     """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3): one
     that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts nothing, one
-    that explains twice as much wholly: what comes and goes by its noise would flicker."""
+    that explains twice as much wholly: what comes and goes by its noise would flicker. Nor does one count where lights
+    that stand a little otherwise would explain far more."""
     sizes, most, others = np.linalg.norm(g, axis=1), np.zeros(len(g)), LeftOver(1.0, 1.0)
-    typical = median(sizes)
+    typical, by_rig = median(sizes), left_by_other_rig(points, g)
     for kind in get_args(Kind):
         one = alternated(points, g, typical, Sought(kind), turns=TURNS, least=LEAST_EXPLAINED)
         evenly = explained_evenly(points, g, typical, one.model)
         left = LeftOver(1 - one.explained, 1 - evenly)
-        holds = _beyond(evenly, LEAST_EVENLY)
+        holds = _beyond(evenly, LEAST_EVENLY) * beside_rig(left, by_rig)
         holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if kind == "rough" else 1.0
         if kind == "soft":  # the last: it must leave much less than the others, or lights that are off look like it
             holds *= _beyond(float(one.model[SOFT]), LEAST_SOFT) * much_less_left(left, others)
@@ -114,6 +114,16 @@ def much_less_left(soft: LeftOver, others: LeftOver) -> float:
     weighted = _beyond(MUCH_LESS_LEFT * others.weighted / max(soft.weighted, 1e-9), 1.0) / ENOUGH_LESS
     evenly = _beyond(LESS_EVENLY * others.evenly / max(soft.evenly, 1e-9), 1.0) / CLEARLY_EVENLY
     return min(weighted, 1.0) * min(evenly, 1.0)
+
+
+def beside_rig(left: LeftOver, by_rig: LeftOver) -> float:
+    """Return how far a model counts beside lights that stand otherwise, 0 to 1, by what either leaves.
+
+    >>> beside_rig(LeftOver(0.22, 0.36), LeftOver(0.03, 0.05)), beside_rig(LeftOver(0.04, 0.06), LeftOver(0.06, 0.08))
+    (0.0, 1.0)
+    """
+    times = max(one / max(other, LEAST_BY_RIG) for one, other in zip(left, by_rig, strict=True))
+    return min(max((THAN_RIG - times) / (THAN_RIG - AS_RIG), 0.0), 1.0)
 
 
 def _beyond(value: float, least: float) -> float:
