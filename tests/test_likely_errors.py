@@ -14,7 +14,7 @@ from psvideo.report.judge.typical_error import MEAN_OF_HELD
 from psvideo.report.observe.kept_facts import KeptFacts
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
-from psvideo.solve.normals.trust.usual_errors import OF_FIVE, POWER, SPREAD_OF_FITTED, beside_fitted
+from psvideo.solve.normals.trust.usual_errors import OF_FIVE, OF_SIX, POWER, SPREAD_OF_FITTED, beside_fitted
 
 FACTOR = 1.5
 
@@ -25,10 +25,10 @@ def under(ways: np.ndarray) -> Illumination:
 
 def test_lights_turn_normals_by_what_is_not_matte_less_the_farther_apart_they_stand() -> None:
     """On a ring of n lights, s from the axis, the trace is (4 / sin^2 s + 1 / cos^2 s) / n."""
-    for lights, slant_deg in product((5, 8), (35, 45)):
+    for lights, slant_deg in product((5, 6, 8), (35, 45)):
         sine, cosine = np.sin(np.radians(slant_deg)), np.cos(np.radians(slant_deg))
         spread = 4 / sine**2 + 1 / cosine**2
-        less = (spread / SPREAD_OF_FITTED) ** (OF_FIVE if lights == 5 else POWER)
+        less = (spread / SPREAD_OF_FITTED) ** {5: OF_FIVE, 6: OF_SIX, 8: POWER}[lights]
         assert beside_fitted(under(ring(lights, slant_deg))) == pytest.approx(less)
     assert beside_fitted(under(ring(5, 15))) == 1.0
 
