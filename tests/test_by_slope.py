@@ -328,6 +328,24 @@ def test_flat_faces_have_no_slope_for_paint_to_go_with_and_what_noise_makes_of_t
     assert surface.valid.mean() > 0.8
 
 
+@pytest.mark.parametrize(("shine", "power"), [(0.1, 30), (0.2, 30), (0.1, 8), (0.2, 8)])
+def test_paint_that_turns_normals_of_a_flat_face_that_shines_is_no_light_that_lamps_add(
+    shine: float, power: float
+) -> None:
+    rng, ways = np.random.default_rng(12), ring(4, 36)
+    normals, albedo = faces(BOX_WAYS, np.full(3, 0.5))
+    soft = cv2.GaussianBlur(rng.normal(size=albedo.shape), (0, 0), 12)
+    albedo = albedo * np.exp(0.4 * soft / soft.std())
+    half = (ways + UP) / np.linalg.norm(ways + UP, axis=1, keepdims=True)
+    plates = []
+    for way, between in zip(ways, half, strict=True):
+        light = np.maximum(normals @ way, 0) * albedo + shine * np.maximum(normals @ between, 0) ** power
+        plates.append((light + rng.normal(0, 0.001, light.shape)).astype(np.float32))
+    lit = Illumination(directions=ways, intensities=np.ones((4, 1)))
+    shown_deg, true_deg = shown_and_true_deg(Case("box", plates, lit, normals, np.ones(albedo.shape, np.bool_)))
+    assert 0.6 * true_deg < shown_deg < 2 * true_deg
+
+
 def test_neighbours_on_either_side_of_a_crease_do_not_speak() -> None:
     _, col = np.mgrid[:60, :160].astype(np.float32)
     lean = np.where(col < 80, -0.7, 0.3) + 0.006 * (col % 80)

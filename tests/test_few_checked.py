@@ -190,7 +190,7 @@ def test_other_lights_leave_little_of_what_a_rig_that_is_off_leaves_and_much_of_
     truth = normals[inside][some][::7]
 
     def left(measured: Array, claimed: Array) -> LeftOver:
-        g = np.linalg.lstsq(claimed, measured, rcond=None)[0].T
+        g: Array = np.linalg.lstsq(claimed, measured, rcond=None)[0].T.astype(np.float64)
         points = SubjectPoints(
             measured=measured,
             counts=np.ones_like(measured),

@@ -31,6 +31,10 @@ FOLLOWED = 0.2
 """Normals that lie farther from what least squares gives than this share of what albedo says follow the subject's
 model, which explains such albedo. (Balls of clay 0.3 to 1.1; waves of clay, where a model is found and hardly followed,
 0.)"""
+MOST_ADDED, NONE_ADDED = 0.5, 1.0
+"""Lamps add up to such a share of what they send (wax and skin 0.1 to 0.35, haze up to 0.3), and surely not the second.
+What looks like more is paint: where a surface shines alike all over a face of a box, its darker paint turns normals
+farther, by 0.4 degrees where albedo differs by 5 %, as if lamps added 7 to 13 times what they send."""
 LOOKED_AT = 1000
 """That is looked at in so many points."""
 SURE = 3.0
@@ -74,12 +78,15 @@ def turned_by_added_deg(
     most = np.zeros(points.known.shape, np.float32)
     for unseen, vector in added:
         much = _surely(pairs, (pairs.there - pairs.here) @ vector)
+        believed = _believed(much)
         along = np.tensordot(vector.astype(np.float32), points.planes, axes=1)
         across = np.sqrt(np.maximum(np.float32(vector @ vector) - along * along, np.float32(0)))
-        turned = np.degrees(np.float32(unseen * abs(much))) * across
+        turned = np.degrees(np.float32(unseen * believed * abs(much))) * across
         if much < 0 and modelled_deg:
             said = FOLLOWED * median(turned[points.known])
             turned *= np.float32(max(1 - modelled_deg / max(said, 1e-6), 0.0))
+        if believed < 1 and not modelled_deg:  # a model parts its paints by itself
+            turned += np.float32(unseen * (1 - believed) * turned_by_paint_deg(pairs))
         most = np.maximum(most, turned)
     return np.asarray(most, np.float32)
 
@@ -107,6 +114,24 @@ def modelled_deg(points: ThinSurface, one: Evidence, known: Mask) -> float:
     plain = (np.linalg.pinv(towards) @ measured[..., None])[..., 0]
     cosines = (plain * found.normals[lit]).sum(axis=1) / np.maximum(np.linalg.norm(plain, axis=1), 1e-12)
     return float(np.degrees(median(np.arccos(np.clip(cosines, -1, 1)))))
+
+
+def turned_by_paint_deg(pairs: SlopePairs) -> float:
+    """Return by how many degrees what a surface mirrors, the same on every paint, turns its normals: it turns the less
+    bright ones more, by the whole of it where albedo is e times less. (Faces of painted boxes with broad and narrow
+    sheens, under four lights: 1.1 to 9 degrees, in truth 0.7 to 5.)"""
+    albedo = pairs.differs
+    along = ((pairs.there - pairs.here) * albedo[:, None]).sum(axis=0) / max(float((albedo**2).sum()), 1e-12)
+    return float(np.degrees(np.linalg.norm(along)))
+
+
+def _believed(much: float) -> float:
+    """Return how far light that is so much of what lamps send is light that they add, 0 to 1.
+
+    >>> _believed(0.3), _believed(-0.75), _believed(7.8)
+    (1.0, 0.5, 0.0)
+    """
+    return min(max((NONE_ADDED - abs(much)) / (NONE_ADDED - MOST_ADDED), 0.0), 1.0)
 
 
 def _surely(pairs: SlopePairs, stretches: Doubles) -> float:
