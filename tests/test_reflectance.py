@@ -27,7 +27,7 @@ from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.reflectance import points_of, reflectance_of
 from psvideo.solve.normals.robust.reflectance_kernel import fill_roughness_in_the_fit
-from psvideo.solve.normals.robust.reflected_light import _rough as rough_in_loops
+from psvideo.solve.normals.robust.reflected_gain import _rough as rough_in_loops
 from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
@@ -379,6 +379,19 @@ def test_a_subject_that_is_known_is_solved_as_one_that_was_found() -> None:
     assert matte.misfit is not None
     assert matte.misfit.reflectance is None
     assert angles_deg(matte.normals, waves()).mean() > 2 * angles_deg(alone.normals, waves()).mean()
+
+
+def test_a_glossy_subject_is_solved_as_one_that_is_hardly_rough_besides() -> None:
+    """What is not rough takes fewer steps to the same end."""
+    lit, sent = distant()
+    plates = shot(waves(), sent, gloss=0.15)
+    glossy = Reflectance(curve=0.1, rough=0.0, soft=0.0, broad=0.05, middle=0.1, narrow=0.05)
+    plain, rough, matte = (
+        Solving(subject=Subject(reflectance=known)).solve(plates, lit).normals
+        for known in (glossy, glossy._replace(rough=1e-12), None)
+    )
+    assert angles_deg(plain, rough).max() < 0.02
+    assert angles_deg(plain, matte).max() > 1
 
 
 def test_what_one_look_at_a_subject_cannot_show_another_does() -> None:

@@ -372,6 +372,22 @@ def test_what_is_not_seen_saturated_or_masked_counts_for_nothing() -> None:
         assert not plane[~surface.valid].any()
 
 
+@pytest.mark.parametrize("spoilt", [1.0, np.nan])
+def test_in_colour_what_cannot_be_read_is_left_out_as_what_is_not_seen_to_the_byte(spoilt: float) -> None:
+    """The block was read once as if all could be used; the marks are made of what lies there."""
+    normals, _ = ball(48, reach_deg=30)
+    lit = Illumination(directions=ring(8, 35), intensities=np.ones((8, 3)))
+    plates = [plate * np.float32([0.7, 0.6, 0.5]) for plate in shoot(normals, lit)]
+    seen = np.ones((8, 48, 48), np.bool_)
+    seen[2, 20:24, 17], seen[5, 24, 24:30] = False, False
+    unseen = solve(LitPlates([plate.copy() for plate in plates], lit, seen=seen))
+    for light, (green, blue) in ((2, (1, 2)), (5, (0, 0))):
+        plates[light][~seen[light], green], plates[light][~seen[light], blue] = spoilt, spoilt
+    left_out = solve(LitPlates(plates, lit))
+    assert left_out.normals.tobytes() == unseen.normals.tobytes()
+    assert left_out.albedo.tobytes() == unseen.albedo.tobytes()
+
+
 def test_the_result_depends_neither_on_threads_nor_on_where_a_pixel_lies() -> None:
     rng = np.random.default_rng(0)
     plates = list(rng.random((7, 300, 500), np.float32))

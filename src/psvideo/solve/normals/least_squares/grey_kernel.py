@@ -6,6 +6,7 @@ One pseudo-inverse holds for all of them, and is applied to the samples as they 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats, Samples
 from psvideo.solve.normals.loops.blocks import HIGH, LOW, MISSING, SLIGHTLY_MORE, X, Y, Z
 from psvideo.solve.normals.loops.measuring import samples_of
@@ -53,5 +54,5 @@ def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: F
         w[X + i] = w[X + i] + x if begun else x
         w[Y + i] = w[Y + i] + y if begun else y
         w[Z + i] = w[Z + i] + z if begun else z
-        w[LOW + i] = min(w[LOW + i], low) if begun else low
-        w[HIGH + i] = max(w[HIGH + i], high) if begun else high
+        w[LOW + i] = min(unmasked(w[LOW + i]), low) if begun else low
+        w[HIGH + i] = max(unmasked(w[HIGH + i]), high) if begun else high

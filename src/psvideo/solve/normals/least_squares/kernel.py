@@ -13,6 +13,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.compute.symmetric import adjugate
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.least_squares.grey_kernel import solve_grey
 from psvideo.solve.normals.loops.blocks import (
@@ -37,7 +38,15 @@ from psvideo.solve.normals.loops.blocks import (
     Z,
 )
 from psvideo.solve.normals.loops.colour_kernel import solve_colours
-from psvideo.solve.normals.loops.measuring import all_seen, any_asked, combine, gather_one, gather_three, hide_unseen
+from psvideo.solve.normals.loops.measuring import (
+    all_seen,
+    any_asked,
+    combine,
+    gather_one,
+    gather_three,
+    hide_unseen,
+    mark_three,
+)
 from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light, place_lights
 from psvideo.solve.normals.loops.storing import store_block
 from psvideo.solve.normals.result import Result
@@ -80,6 +89,8 @@ def _solve_block(
     if not done or (keep_measurements and not summed):
         if channels == 1:
             gather_one(task, values, start, n)
+        elif plain:
+            mark_three(task, values, n)
         else:
             gather_three(task, values, start, n)
         hide_unseen(task, values, row, col, n)
@@ -124,9 +135,9 @@ def _add_equations(task: Task, w: Floats, n: int, a: Floats, b: Floats, c: Float
         one_p = ONE if (p > dark_a) & (p * at(per_a, i) > limit) else ZERO
         one_q = ONE if (q > dark_b) & (q * at(per_b, i) > limit) else ZERO
         one_r = ONE if (r > dark_c) & (r * at(per_c, i) > limit) else ZERO
-        a[i] = p if one_p > ZERO else MISSING
-        b[i] = q if one_q > ZERO else MISSING
-        c[i] = r if one_r > ZERO else MISSING
+        a[i] = unmasked(p) if one_p > ZERO else MISSING
+        b[i] = unmasked(q) if one_q > ZERO else MISSING
+        c[i] = unmasked(r) if one_r > ZERO else MISSING
         p, q, r = p * one_p, q * one_q, r * one_r
         x, y, z = xa * p + xb * q + xc * r, ya * p + yb * q + yc * r, za * p + zb * q + zc * r
         w[X + i] = w[X + i] + x if begun else x

@@ -12,6 +12,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, flattened
 from psvideo.compute.symmetric import adjugate
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats, Samples
 from psvideo.solve.normals.loops.blocks import (
     BLOCK,
@@ -145,7 +146,7 @@ def _solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: i
             m[i] = value
             unusable = np.int32(unusable | (value <= dark))
             w[SUM + i] += value * per
-            w[LOW + i] = min(w[LOW + i], value * per)
+            w[LOW + i] = min(unmasked(w[LOW + i]), value * per)
     a, b, c, d, e, f, determinant = adjugate(*_squares(task))
     one = ONE / determinant
     a, b, c, d, e, f = a * one, b * one, c * one, d * one, e * one, f * one

@@ -8,6 +8,7 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened, pointer
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Bytes, Floats, Samples
 from psvideo.solve.normals.loops.blocks import (
     ABSENT,
@@ -65,6 +66,21 @@ def gather_three(task: Task, values: Floats, start: int, n: int) -> None:
             v[i] = r if here else MISSING
             v[BLOCK + i] = g if here else MISSING
             v[2 * BLOCK + i] = b if here else MISSING
+
+
+@FUSED.inlined
+def mark_three(task: Task, values: Floats, n: int) -> None:
+    """As ``gather_three``, where all samples lie in ``values`` without a mark, as ``colour_kernel`` leaves them."""
+    line = flattened(values)
+    for light in range(task.lights):
+        v = line[3 * BLOCK * light : 3 * BLOCK * (light + 1)]
+        ceiling_r, ceiling_g, ceiling_b = task.tone[light, 0, 2], task.tone[light, 1, 2], task.tone[light, 2, 2]
+        for i in range(n):
+            r, g, b = v[i], v[BLOCK + i], v[2 * BLOCK + i]
+            here = (r < ceiling_r) & (g < ceiling_g) & (b < ceiling_b) & (min(r, min(g, b)) > ABSENT)
+            v[i] = unmasked(r) if here else MISSING
+            v[BLOCK + i] = unmasked(g) if here else MISSING
+            v[2 * BLOCK + i] = unmasked(b) if here else MISSING
 
 
 @FUSED.inlined
@@ -159,7 +175,8 @@ def hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
         light = plane // channels
         if seen.shape[2] > 1:
             for i in range(n):
-                values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
+                value = unmasked(values[plane, i])
+                values[plane, i] = value if seen[light, row, col + i] else MISSING
         elif not seen[light, row, 0]:
             values[plane, :n] = MISSING
 
@@ -177,11 +194,18 @@ def read_block(task: Task, values: Floats, row: int, col: int, n: int) -> None:
 
 
 @FUSED.called
-def read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int) -> None:
-    """Read a block's measurements; what is saturated, unseen or in shadow is MISSING, and COUNT is what remains."""
+def read_usable(
+    task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, tried: bool
+) -> None:  # fmt: skip
+    """Read a block's measurements; what is saturated, unseen or in shadow is MISSING, and COUNT is what remains.
+
+    tried: ``solve_colours`` has read them.
+    """
     start, channels = row * task.cols + col, task.tone.shape[1]
     if channels == 1:
         gather_one(task, values, start, n)
+    elif tried:
+        mark_three(task, values, n)
     else:
         gather_three(task, values, start, n)
     hide_unseen(task, values, row, col, n)
@@ -198,15 +222,15 @@ def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
     for light in range(task.lights):
         plane, per, dark = m[light], task.per_strength[light], task.dark[light]
         for i in range(n):
-            w[LIMIT + i] = min(w[LIMIT + i], dark * at(per, i))
+            w[LIMIT + i] = min(unmasked(w[LIMIT + i]), dark * at(per, i))
             w[SUM + i] += max(plane[i] * at(per, i), ZERO) if plane[i] > ABSENT else ZERO
             w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
     for i in range(n):
-        w[LIMIT + i] = max(w[LIMIT + i], task.ratio * w[SUM + i] / (w[COUNT + i] + TINY))
+        w[LIMIT + i] = max(unmasked(w[LIMIT + i]), task.ratio * w[SUM + i] / (w[COUNT + i] + TINY))
         w[COUNT + i] = ZERO
     for light in range(task.lights):
         plane, per, dark = m[light], task.per_strength[light], task.dark[light]
         for i in range(n):
             lit = (plane[i] > dark) & (plane[i] * at(per, i) > w[LIMIT + i])
-            plane[i] = plane[i] if lit else MISSING
+            plane[i] = unmasked(plane[i]) if lit else MISSING
             w[COUNT + i] += ONE if lit else ZERO

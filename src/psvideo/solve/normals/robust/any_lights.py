@@ -3,6 +3,7 @@
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light, shown
@@ -37,7 +38,7 @@ def choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, 
         plane, sorted_out, per = m[light], e[light], task.per_strength[light]
         for i in range(n):
             bright = plane[i] * at(per, i)
-            v[UPPER + i] = max(v[UPPER + i], bright)
+            v[UPPER + i] = max(unmasked(v[UPPER + i]), bright)
             sorted_out[i] = bright if plane[i] > ABSENT else OUT
     for i in range(n):
         count = w[COUNT + i]

@@ -7,6 +7,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import (
     BLOCK,
@@ -79,6 +80,7 @@ def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool
     """g from the normal equations; where they are badly conditioned what was there stays (``keep``), or 0."""
     for i in range(n):
         a, b, c, d, e, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
+        old_x, old_y, old_z = unmasked(w[X + i]), unmasked(w[Y + i]), unmasked(w[Z + i])
         xx, xy, xz, yy, yz, zz, determinant = adjugate(a, b, c, d, e, f)
         p, q, r = w[RIGHT_X + i], w[RIGHT_Y + i], w[RIGHT_Z + i]
         sound = (a + d + f) * (xx + yy + zz) <= condition_squared * determinant
@@ -86,9 +88,9 @@ def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool
         scale = ONE / determinant if sound else ZERO
         x, y, z = xx * p + xy * q + xz * r, xy * p + yy * q + yz * r, xz * p + yz * q + zz * r
         kept = keep & (not sound)
-        w[X + i] = w[X + i] if kept else x * scale
-        w[Y + i] = w[Y + i] if kept else y * scale
-        w[Z + i] = w[Z + i] if kept else z * scale
+        w[X + i] = old_x if kept else x * scale
+        w[Y + i] = old_y if kept else y * scale
+        w[Z + i] = old_z if kept else z * scale
 
 
 @FUSED.called
@@ -126,6 +128,7 @@ def halve(v: Floats, e: Floats, n: int) -> None:
                 two = (ONE if a[i] <= middle else ZERO) + (ONE if b[i] <= middle else ZERO)
                 v[COUNTED + i] = old * v[COUNTED + i] + two + (ONE if c[i] <= middle else ZERO)
         for i in range(n):
-            middle, enough = HALF * (v[FROM + i] + v[TO + i]), v[COUNTED + i] >= v[RANK + i]
-            v[TO + i] = middle if enough else v[TO + i]
-            v[FROM + i] = v[FROM + i] if enough else middle
+            start, end = unmasked(v[FROM + i]), unmasked(v[TO + i])
+            middle, enough = HALF * (start + end), v[COUNTED + i] >= v[RANK + i]
+            v[TO + i] = middle if enough else end
+            v[FROM + i] = start if enough else middle

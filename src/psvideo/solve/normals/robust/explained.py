@@ -6,6 +6,7 @@ There nothing is to be weighed down, least squares is the best estimate (Gauss a
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats, Indices
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
@@ -48,7 +49,8 @@ def list_unexplained(task: Task, w: Floats, m: Floats, listed: Indices, n: int) 
             share = LIGHTS / at(per, i)
             variance = read + photon * max(m[light, i], ZERO) + share * share * (a * a + b * b + c * c)
             there = m[light, i] > ABSENT
-            w[ODD + i] = ONE if there & (error * error > EXPLAINED_SQUARED * variance) else w[ODD + i]
+            odd = unmasked(w[ODD + i])
+            w[ODD + i] = ONE if there & (error * error > EXPLAINED_SQUARED * variance) else odd
             left = FAR_OFF_SQUARED * variance * (w[COUNT + i] - THREE)
             w[FAR_OFF + i] += ONE if there & (error * error * w[COUNT + i] > left) else ZERO
     count, far_off, measured, unsolved = 0, ZERO, ZERO, False

@@ -4,6 +4,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Bytes, Floats, Indices
 from psvideo.solve.normals.loops.blocks import ZERO
 from psvideo.solve.normals.result import Result
@@ -27,7 +28,8 @@ def hand_out(
 ) -> None:
     """Write solved pixels where they go."""
     for i in range(n):
-        v[DOUBT + i] = v[DOUBT + i] if block.valid[i] else ZERO
+        doubt = unmasked(v[DOUBT + i])
+        v[DOUBT + i] = doubt if block.valid[i] else ZERO
     for i in range(min(n, len(unexplained))):
         unexplained[places[i]] = v[UNEXPLAINED + i] if block.valid[i] else ZERO
     for axis in range(3):

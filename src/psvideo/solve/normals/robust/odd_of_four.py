@@ -9,6 +9,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light, shown
@@ -54,16 +55,19 @@ def drop_odd_of_four(task: Task, weights: Weights, w: Floats, v: Floats, m: Floa
             to_mirror = ONE / np.sqrt(half_x * half_x + half_y * half_y + half_z**2)
             half_x, half_y, half_z = half_x * to_mirror, half_y * to_mirror, half_z * to_mirror
             nearness = _nearness_without(w, v, i, x, y, z, e[light, i], half_x, half_y, half_z)
-            better = (e[light, i] > ZERO) & (nearness > v[BEST + i])
-            v[BEST + i] = nearness if better else v[BEST + i]
-            v[ODD + i] = np.float32(light) if better else v[ODD + i]
+            best, odd = unmasked(v[BEST + i]), unmasked(v[ODD + i])
+            better = (e[light, i] > ZERO) & (nearness > best)
+            v[BEST + i] = nearness if better else best
+            v[ODD + i] = np.float32(light) if better else odd
     for i in range(n):
-        v[ODD + i] = v[ODD + i] if v[DOUBT + i] > ZERO else -ONE
+        odd = unmasked(v[ODD + i])
+        v[ODD + i] = odd if v[DOUBT + i] > ZERO else -ONE
         v[DOUBT + i] = np.sqrt(v[SQUARES + i]) if v[ODD + i] >= ZERO else ZERO
         w[COUNT + i] -= ONE if v[ODD + i] >= ZERO else ZERO
     for light in range(task.lights):
         for i in range(n):
-            m[light, i] = MISSING if v[ODD + i] == np.float32(light) else m[light, i]
+            there = unmasked(m[light, i])
+            m[light, i] = MISSING if v[ODD + i] == np.float32(light) else there
     _solve_again(task, w, v, m, e, n)
 
 

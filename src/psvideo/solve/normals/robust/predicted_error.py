@@ -4,6 +4,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.compute.whole_stores import unmasked
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.robust.equations import DOUBT, LOWER, SCALE, SENT
@@ -45,6 +46,6 @@ def predict_error(weights: Weights, checked: int, w: Floats, v: Floats, n: int) 
         judged = solved & (not few) & (count > THREE)
         v[UNEXPLAINED + i] = scale / light if judged else ZERO
         v[DOUBT + i] = min(error, NO_ERROR)
-        w[X + i] = x if trusted else ZERO
-        w[Y + i] = y if trusted else ZERO
-        w[Z + i] = z if trusted else ZERO
+        w[X + i] = unmasked(x) if trusted else ZERO
+        w[Y + i] = unmasked(y) if trusted else ZERO
+        w[Z + i] = unmasked(z) if trusted else ZERO

@@ -1,8 +1,7 @@
-"""Compiled part of the robust solver: what a subject that is not matte shows beyond n . l, what that gains with g, and
-samples without it.
+"""Compiled part of the robust solver: what a subject that is not matte shows beyond n . l, what measurements leave of
+that, and samples without it.
 
-A measurement is s (|g| f(n) + q(n)), f matte and q what varnish mirrors. Without s q it is J g exactly, with its
-gradient J (light, 3, pixel) at g.
+A measurement is s (|g| f(n) + q(n)), f matte and q what varnish mirrors.
 """
 
 import numpy as np
@@ -11,7 +10,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, MISSING, ONE, TINY, ZERO, X, Y, Z
 from psvideo.solve.normals.loops.near_kernel import at, of_light
-from psvideo.solve.normals.robust.equations import VIEW_X, VIEW_Y, VIEW_Z
+from psvideo.solve.normals.robust.equations import OUT, VIEW_X, VIEW_Y, VIEW_Z
 from psvideo.solve.normals.robust.room import (
     FACING,
     GAIN,
@@ -51,7 +50,7 @@ def find_ways(room: Room, n: int) -> None:
 
 
 @FUSED.inlined
-def _shine(weights: Weights, cosine: np.float32) -> tuple[np.float32, np.float32]:
+def shine(weights: Weights, cosine: np.float32) -> tuple[np.float32, np.float32]:
     """What varnish mirrors at a cosine to half way, and what it gains with the cosine."""
     two = cosine * cosine
     four = two * two
@@ -71,7 +70,7 @@ def _shine(weights: Weights, cosine: np.float32) -> tuple[np.float32, np.float32
 
 
 @FUSED.inlined
-def _rough_share(cosine: np.float32, facing: np.float32, towards: np.float32) -> np.float32:
+def rough_share(cosine: np.float32, facing: np.float32, towards: np.float32) -> np.float32:
     """What rough surfaces add, over the cosine to a light; ``facing`` and ``towards`` are the normal's and the light's
     cosines to the camera."""
     seen = max(facing, LEAST_FACING)
@@ -80,23 +79,8 @@ def _rough_share(cosine: np.float32, facing: np.float32, towards: np.float32) ->
 
 
 @FUSED.inlined
-def _rough(cosine: np.float32, facing: np.float32, towards: np.float32) -> tuple[np.float32, np.float32, np.float32]:
-    """What rough surfaces add, and what it gains with the cosines to the light and to the camera."""
-    share = _rough_share(cosine, facing, towards)
-    back = ONE if share > ZERO else ZERO
-    seen = max(facing, LEAST_FACING)
-    over = cosine > seen
-    by_cosine = -seen if over else towards / seen - TWO * cosine
-    by_facing = -cosine if over else -cosine * towards / (seen * seen)
-    return share * cosine, back * by_cosine, back * by_facing
-
-
-@FUSED.called
-def fill_gradient(room: Room, lights: int, weights: Weights, n: int) -> None:
-    """What each measurement gains by a little more of g, in each direction, at g; and measurements without shine.
-
-    The long loop writes into ``kept`` alone, so that the compiler sees that nothing overlaps and makes vectors of it.
-    """
+def fill_units(room: Room, n: int) -> None:
+    """Unit normals of g, 1 / |g|, the ways to the camera, and the cosines between both."""
     kept, w, v = room.kept, room.planes, room.more
     for i in range(n):
         a, b, c = w[X + i], w[Y + i], w[Z + i]
@@ -106,33 +90,28 @@ def fill_gradient(room: Room, lights: int, weights: Weights, n: int) -> None:
         x, y, z = v[VIEW_X + i], v[VIEW_Y + i], v[VIEW_Z + i]
         kept[TO_X + i], kept[TO_Y + i], kept[TO_Z + i] = x, y, z
         kept[FACING + i] = kept[UNIT_X + i] * x + kept[UNIT_Y + i] * y + kept[UNIT_Z + i] * z
+
+
+@FUSED.called
+def fill_left_over(room: Room, lights: int, weights: Weights, n: int) -> None:
+    """Absolute residuals under the model at g; OUT where a measurement is MISSING."""
+    kept = room.kept
+    fill_units(room, n)
     for light in range(lights):
         begin = BLOCK * (KEPT + OF_LIGHT * light)
-        way, line = room.ways[light], kept[begin : begin + BLOCK * OF_LIGHT]
+        way, line, there, errors = room.ways[light], kept[begin:], room.measurements[light], room.errors[light]
         for i in range(n):
-            a, b, c, per_size = kept[UNIT_X + i], kept[UNIT_Y + i], kept[UNIT_Z + i], kept[PER_SIZE + i]
-            dx, dy, dz, to_half, strength, towards = way[0, i], way[1, i], way[2, i], way[3, i], way[4, i], way[5, i]
-            x, y, z, facing = kept[TO_X + i], kept[TO_Y + i], kept[TO_Z + i], kept[FACING + i]
-            cosine = a * dx + b * dy + c * dz
-            half = max((cosine + facing) * to_half, ZERO)
+            cosine = kept[UNIT_X + i] * way[0, i] + kept[UNIT_Y + i] * way[1, i] + kept[UNIT_Z + i] * way[2, i]
+            facing = kept[FACING + i]
             holds = kept[HOLDS + i] if cosine > ZERO else ZERO
-            much, more = _shine(weights, half)
-            curve, by_half = weights.curve * holds, more * holds * per_size
-            added, rough_by_cosine, by_facing = _rough(cosine, facing, towards)
-            rough, soft = weights.rough * holds, weights.soft * kept[HOLDS + i]
-            by_cosine = ONE - soft + TWO * curve * cosine + rough * rough_by_cosine
-            by_facing *= rough
-            along = cosine + soft * (ONE - cosine) + curve * cosine * cosine + rough * added
-            along -= by_cosine * cosine + by_half * half + by_facing * facing
-            by_half *= to_half
-            by_light = by_cosine + by_half
-            line[i] = strength * (along * a + by_light * dx + by_half * x + by_facing * x)
-            line[BLOCK + i] = strength * (along * b + by_light * dy + by_half * y + by_facing * y)
-            line[2 * BLOCK + i] = strength * (along * c + by_light * dz + by_half * z + by_facing * z)
-            line[3 * BLOCK + i] = strength * holds * much
-        there, without = room.measurements[light], room.matte[light]
+            much, _ = shine(weights, max((cosine + facing) * way[3, i], ZERO))
+            rough = weights.rough * rough_share(cosine, facing, way[5, i])
+            matte = cosine + weights.soft * kept[HOLDS + i] * (ONE - cosine)
+            matte += holds * (weights.curve * cosine + rough) * cosine
+            line[i] = way[4, i] * (matte / kept[PER_SIZE + i] + holds * much)
         for i in range(n):
-            without[i] = there[i] - line[3 * BLOCK + i] if there[i] > ABSENT else MISSING
+            error = abs(there[i] - line[i])
+            errors[i] = error if there[i] > ABSENT else OUT
 
 
 @FUSED.called
@@ -150,9 +129,9 @@ def take_off(room: Room, lights: int, weights: Weights, n: int) -> None:
             cosine = kept[UNIT_X + i] * way[0, i] + kept[UNIT_Y + i] * way[1, i] + kept[UNIT_Z + i] * way[2, i]
             half = max((cosine + facing) * way[3, i], ZERO)
             holds = kept[HOLDS + i] if cosine > ZERO else ZERO
-            much, _ = _shine(weights, half)
+            much, _ = shine(weights, half)
             kept[SHINE + i] = holds * much * way[4, i]
-            share = _rough_share(cosine, facing, way[5, i])
+            share = rough_share(cosine, facing, way[5, i])
             kept[GAIN + i] = ONE / (ONE + holds * (weights.curve * cosine + weights.rough * share))
         for channel in range(channels):
             plane = values[light * channels + channel]

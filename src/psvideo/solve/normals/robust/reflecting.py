@@ -11,7 +11,8 @@ from psvideo.model.arrays import Floats
 from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, ONE, TINY, ZERO, X, Y, Z
 from psvideo.solve.normals.robust.any_lights import add_weighted, fill_residuals, find_scale
 from psvideo.solve.normals.robust.equations import OUT, SCALE, solve_equations
-from psvideo.solve.normals.robust.reflected_light import TWO, fill_gradient, take_off
+from psvideo.solve.normals.robust.reflected_gain import fill_gradient
+from psvideo.solve.normals.robust.reflected_light import TWO, fill_left_over, take_off
 from psvideo.solve.normals.robust.room import (
     AFTER,
     BEFORE,
@@ -62,8 +63,7 @@ def reflect(room: Room, lights: int, weights: Weights, n: int) -> None:
         add_weighted(gradient, weights.tukey, weights.width, False, w, v, matte, e, n)
         solve_equations(w, n, _SOUND_SQUARED, True)
         _shorten(kept, w, n)
-    fill_gradient(room, lights, weights, n)
-    fill_residuals(gradient, w, matte, e, n)
+    fill_left_over(room, lights, weights, n)
     _add_up(kept, AFTER, e, n)
     _mix(weights, kept, w, n)
 

@@ -195,5 +195,5 @@ def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) 
     if summed:
         w[COUNT : COUNT + n], w[LIMIT : LIMIT + n] = np.float32(task.lights), _least_lit(task)
     else:
-        read_usable(task, w, values, m, row, col, n)
+        read_usable(task, w, values, m, row, col, n, plain)
     return summed
