@@ -377,7 +377,7 @@ def test_in_colour_what_cannot_be_read_is_left_out_as_what_is_not_seen_to_the_by
     """The block was read once as if all could be used; the marks are made of what lies there."""
     normals, _ = ball(48, reach_deg=30)
     lit = Illumination(directions=ring(8, 35), intensities=np.ones((8, 3)))
-    plates = [plate * np.float32([0.7, 0.6, 0.5]) for plate in shoot(normals, lit)]
+    plates = [plate * np.array([0.7, 0.6, 0.5], np.float32) for plate in shoot(normals, lit)]
     seen = np.ones((8, 48, 48), np.bool_)
     seen[2, 20:24, 17], seen[5, 24, 24:30] = False, False
     unseen = solve(LitPlates([plate.copy() for plate in plates], lit, seen=seen))
