@@ -273,6 +273,13 @@ def test_gain_that_jumps_from_frame_to_frame_is_said(plan: Plan) -> None:
     assert any("gain by itself" in note for note in timing_of(plan, filmed(plan, gain=gain)).notes)
 
 
+@pytest.mark.parametrize(("dimmer", "said"), [(3.0, True), (40.0, False)])
+def test_light_that_changes_by_more_than_a_camera_can_is_no_gain(plan: Plan, dimmer: float, *, said: bool) -> None:
+    """Of balls that cross a dark picture light was said to grow by 1072753 %, here by 3034."""
+    timing = timing_of(plan, filmed(plan, gain=np.geomspace(1.0, 1 / dimmer, FRAMES)))
+    assert (timing.swing is not None) == said
+
+
 def swinging(plan: Plan, seed: int) -> np.ndarray:
     """Return the row profiles of a scene whose every flash gives another amount of light, with 6 % between them."""
     rng = np.random.default_rng(seed)

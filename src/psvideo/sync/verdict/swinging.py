@@ -47,6 +47,9 @@ ABRUPT = 0.25
 SLOWLY_AT_MOST = 1.0
 """Lamps that creep change by no more than this share; more than that by and by is a subject that comes or goes: a face
 that came in from the side, and grew brighter in all rows alike, gave a share of 96."""
+MOST = 15.0
+"""No camera's exposure, and no lamp's supply, changes by more within a clip: four stops. What does is a subject that
+crosses a dark picture, of which frames without it show next to nothing: gains differed by shares of 1,400 to 12,800."""
 TURNS = 4
 """Flashes whose tails or rows overlap share what is left; so often it is dealt out again."""
 TOGETHER = 512
@@ -129,6 +132,8 @@ def swing_of(plan: Plan, found: ClipFit) -> Swing | None:
                 return None
             if share == 0.0:  # some give none at all, which are named as black or unfired
                 return None
+            if share > MOST or (share > SLOWLY_AT_MOST and cause != "lamps" and _frames_differ(blocks)):
+                return None
             return Swing(share=share, cause="either" if moves else cause)
     return None
 
@@ -165,6 +170,20 @@ def _rows_differ(blocks: Sequence[_Seen], rest: float) -> bool:
     """Return whether gains of flashes in each of the blocks of rows leave clearly less than ``rest``, the square that
     those of all rows leave, as where a subject moves: lamps change all rows alike."""
     return rest > ROWS_DIFFER * sum(_flash_gains(block).rest for block in blocks)
+
+
+def _frames_differ(blocks: Sequence[_Seen]) -> bool:
+    """Return whether gains of frames that are the same in all blocks of rows leave clearly more than each block's own,
+    as where a subject crosses some rows after others: a camera's gain changes all rows alike."""
+    gains = [_frame_gains(block, frames_each=1)[0][0] for block in blocks]
+    power = [(block.trust * block.expected**2).sum(axis=1) for block in blocks]
+    common = sum(p * gain for p, gain in zip(power, gains, strict=True)) / np.maximum(sum(power), TINY)
+    own = sum(
+        block.beside_light(block.rows.value - g[:, None] * block.expected)
+        for block, g in zip(blocks, gains, strict=True)
+    )
+    alike = sum(block.beside_light(block.rows.value - common[:, None] * block.expected) for block in blocks)
+    return alike > ROWS_DIFFER * own
 
 
 def _abrupt(flashes: "_FlashGains") -> bool:
