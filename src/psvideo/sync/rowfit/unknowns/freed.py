@@ -55,8 +55,8 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
     if only_shutter and within_blur(rows, first.beat, fit.beat) and cleared(plan, rows, first, fit) < BELIEVED:
         blur_s = BLURRED * (soft_s or blurred_s(plan, rows, first))
         return Freed(fit=first, unsure_s=float(np.hypot(blur_s, hidden_s)), soft_s=soft_s)
-    if not (soft_s or tells_tails(plan)):
-        hidden_s = float(np.hypot(hidden_s, untold_tails_s(plan, rows, fit, moves=may_hide_tails(plan, rows, fit))))
+    if not (soft_s or tells_tails(plan) or may_hide_tails(plan, rows, fit)):
+        hidden_s = float(np.hypot(hidden_s, untold_tails_s(plan, rows, fit, moves=False)))
     unsure_s = float(np.hypot(unsure_s, hidden_s))
     if not (soft_s or set(TAILS) & set(free)):
         unsure_s = float(np.hypot(unsure_s, BLURRED * blurred_s(plan, rows, fit)))

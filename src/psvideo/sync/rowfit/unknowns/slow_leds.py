@@ -12,7 +12,7 @@ from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.likelier import STILL, Freed, has_moved, loss_of, taken_away
 from psvideo.sync.rowfit.unknowns.softness import FEIGNED, cleared, plausible
-from psvideo.sync.rowfit.unknowns.untold_tails import tails_tried
+from psvideo.sync.rowfit.unknowns.untold_tails import tails_tried, untold_tails_s
 
 SLOWER, SLOWER_SHARE = 10.0, 5e-3
 """What tails must take away of the robust loss beyond what a blur does, and which share of it; alone they must do more
@@ -48,7 +48,7 @@ def tails_freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tai
     slow = fitted(plan, rows, fit.beat, (*free, *tails))
     gain = taken_away(plan, rows, fit, slow)
     if gain < SOFT or not plausible(plan, slow.beat):
-        return Freed(fit=fit)
+        return Freed(fit=fit, unsure_s=_hidden_s(plan, rows, fit, slow) if may_hide_tails(plan, rows, fit) else 0.0)
     row_time_s = fit.beat.row_time_s
     if row_time_s == 0.0:
         return Freed(fit=slow if has_moved(fit, slow, tails) and gain > SLOWER else fit)
@@ -71,6 +71,13 @@ def tails_freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tai
         return Freed(fit=taken, unsure_s=apart_s)
     doubt_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, both.beat), both.shift_error_s))
     return Freed(fit=fit, unsure_s=doubt_s, soft_s=max(slow.beat.rise_s, slow.beat.fall_s))
+
+
+def _hidden_s(plan: Plan, rows: Profiles, fit: Fit, slow: Fit) -> float:
+    """Return by how much times are in doubt because tails that the picture does not show may be there all the same: as
+    far as a fit with tails moves them, but no farther than rows make likely."""
+    moved_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, slow.beat), _more_s(fit, slow)))
+    return min(moved_s, untold_tails_s(plan, rows, fit, moves=True))
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
