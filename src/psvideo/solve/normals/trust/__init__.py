@@ -9,7 +9,8 @@ for while the plates are being solved; its loop: ``indirect_kernel``), albedo th
 and of light that all lamps add ``added_light``; both look at ``slope_pairs``, whose loops are in ``by_slope_kernel``)
 or pales where something shines (``by_colour``), shadows that pass for light (``lit_shadows``), ``near_spread`` (near
 lights, whose directions depend on the distance), ``moving_doubt`` (plates that do not match after alignment, beside
-what more than three lights say of them, ``witness``; ``agreeing`` takes off what these do not bear out),
+what more than three lights say of them, ``witness``; ``agreeing`` takes off what these do not bear
+out; ``continued``, with ``continued_kernel``, takes normals on across narrow doubt),
 ``few_checked`` (by how much a model of the subject would turn normals under four and five lights, where it leaves no
 more than ``by_other_rig``), and ``unchecked`` (what three lights leave of real surfaces, and show hardly anywhere;
 and how well few lights check each other; ``hidden_share``: how much of what is not matte lights hide altogether).
