@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.arrays import Doubles, Integers, Mask
+from psvideo.model.arrays import Doubles, Mask
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.compiled_profiles import compiled_flashes
@@ -45,12 +45,21 @@ def shared_tails(plan: Plan, rows: Profiles, beat: Beat, lengths_s: Doubles) -> 
     if len(plan.lit_slots) == len(plan.flashes):
         return more
     rows = without_ambient(plan, replace(rows.one_window(), doubt=None, restless=None), beat)
-    lit = np.flatnonzero(compiled_flashes(plan, rows, beat).unknown)
-    some = lit[np.unique(np.linspace(0, len(lit) - 1, MOST_FLASHES).astype(np.int64))] if len(lit) else lit
-    if not len(some):
+    flashes = compiled_flashes(plan, rows, beat)
+    lit = np.flatnonzero(flashes.unknown)
+    if not len(lit):
         return more
-    sharp = _seen(plan, rows, beat, some)
-    kept = _kept(rows, sharp, _seen(plan, rows, with_tails(beat, NEAR * plan.shortest_flash_s), some))
+    some = lit[np.unique(np.linspace(0, len(lit) - 1, MOST_FLASHES).astype(np.int64))]
+    start_s, duration_s = flashes.start_s[some], flashes.duration_s[some]
+
+    def seen(tail_s: float) -> SeenFlashes:
+        """Return what frames see of the flashes under longer tails; one frame more than may see any."""
+        slower = with_tails(beat, tail_s)
+        touched = frames_seeing(rows, slower, duration_s) + 1
+        return seen_flashes(rows, slower, start_s - tail_s, duration_s, touched=touched)
+
+    sharp = seen(0.0)
+    kept = _kept(rows, sharp, seen(NEAR * plan.shortest_flash_s))
     if kept.sum() < LEAST:
         return more
     apart = _apart(rows, sharp)[kept]
@@ -58,21 +67,12 @@ def shared_tails(plan: Plan, rows: Profiles, beat: Beat, lengths_s: Doubles) -> 
     scale = CAUCHY * max(float(np.sqrt(np.mean(np.minimum(np.abs(apart), OUTLIER * usual) ** 2))), 1e-30)
     before = float(np.log1p((apart / scale) ** 2).sum())
     for n, tail_s in enumerate(lengths_s.tolist()):
-        left = _apart(rows, _seen(plan, rows, with_tails(beat, tail_s), some))[kept]
+        left = _apart(rows, seen(tail_s))[kept]
         more[n] = float(np.log1p((left / scale) ** 2).sum()) - before
         if more[n] > OUT_OF_QUESTION:
             more[n + 1 :] = np.inf
             break
     return more
-
-
-def _seen(plan: Plan, rows: Profiles, beat: Beat, some: Integers) -> SeenFlashes:
-    """Return what frames see of some flashes by their place in the train; one frame more than may see any."""
-    flashes = compiled_flashes(plan, rows, beat)
-    duration_s = flashes.duration_s[some]
-    return seen_flashes(
-        rows, beat, flashes.start_s[some], duration_s, touched=frames_seeing(rows, beat, duration_s) + 1
-    )
 
 
 def _apart(rows: Profiles, seen: SeenFlashes) -> Doubles:
