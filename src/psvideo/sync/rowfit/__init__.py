@@ -19,5 +19,5 @@ Rooms, in the order in which a fit goes through them:
 - ``unknowns``: what else may be free besides the times, where the data call for it
 
 Beside them, ``whatever_moves`` finds the strobe where a subject is too fast for a fit: it asks no brightness to stay,
-but what frames that share a flash say (``shared_light``, and of LEDs' tails ``shared_tails``).
+but what frames that share a flash say (``shared_light``).
 """

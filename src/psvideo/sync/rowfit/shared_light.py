@@ -73,7 +73,7 @@ def sharpened(plan: Plan, rows: Profiles, beat: Beat) -> tuple[Beat, float]:
     turn_ppm = 1e6 * SHIFT * flash_s / half_s  # moves the clip's ends by as much as the other step moves all of it
     held, moves = turn_ppm / (0.5 * plan.clock_range_ppm), np.zeros((0, 2))
     for _ in range(TURNS):
-        rows = without_ambient(plan, rows, beat)
+        rows = _without_ambient(plan, rows, beat)
         asked = _asked(plan, rows, beat)
         apart = asked.apart
         moved = (
@@ -105,7 +105,7 @@ def _without(whole: Doubles, slopes: Doubles, rest: Doubles) -> Doubles:
     return moved
 
 
-def without_ambient(plan: Plan, rows: Profiles, beat: Beat) -> Profiles:
+def _without_ambient(plan: Plan, rows: Profiles, beat: Beat) -> Profiles:
     """Return rows less what each shows in dark slots on an average, or all do where few frames show that."""
     dark = _asked(plan, rows, beat).dark
     count = dark.sum(axis=0)

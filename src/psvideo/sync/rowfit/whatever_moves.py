@@ -18,21 +18,15 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.shared_light import left_of, sharpened
-from psvideo.sync.rowfit.shared_tails import shared_tails
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.jitter import STEADY
-from psvideo.sync.rowfit.unknowns.untold_tails import lengths_tried_s, likely_length_s
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
 
 ROWS, ROWS_EACH = 60, 4
 """Places are searched with so many rows, or with as many as leave the shortest flash the second;"""
 FINE_EACH = 24
-"""they are sharpened with as many as leave it this many,"""
-TAILS_EACH = 240
-"""and asked for tails with this many: of those that are shorter than a row is, rows say nothing."""
-SHOWN = 3.0
-"""Tails must take away so much of the robust loss of what frames that share a flash contradict to count."""
+"""they are sharpened with as many as leave it this many."""
 MOST_FRAMES = 120
 """So many frames in a row are searched, those with the most light."""
 STEPS = 4
@@ -75,7 +69,7 @@ def sure_place(plan: Plan, rows: Profiles) -> SurePlace | None:
     elsewhere = float(left[away_s > flash_s].min(initial=np.inf))
     if least > min(LEFT, CLEARLY * elsewhere) or not error_s < flash_s or _lengths_differ(plan, few, beat):
         return None
-    return SurePlace(beat=beat, error_s=float(np.hypot(error_s, _untold_tails_s(plan, rows, beat))), left=least)
+    return SurePlace(beat=beat, error_s=error_s, left=least)
 
 
 def contradicts(plan: Plan, found: ClipFit, place: SurePlace) -> bool:
@@ -116,13 +110,6 @@ def placed_fit(plan: Plan, rows: Profiles, place: SurePlace) -> ClipFit:
     )
 
 
-def _untold_tails_s(plan: Plan, rows: Profiles, beat: Beat) -> float:
-    """Return how long tails may be that the plan does not tell where frames that share a flash show some, else 0."""
-    lengths_s = lengths_tried_s(plan)
-    more = shared_tails(plan, _laid_out(plan, rows, TAILS_EACH), beat, lengths_s)
-    return likely_length_s(lengths_s, more) if more.min() < -SHOWN else 0.0
-
-
 def _lengths_differ(plan: Plan, rows: Profiles, beat: Beat) -> bool:
     """Return whether flashes much longer or shorter than the plan's, in the same places, contradict far less."""
     least = left_of(plan, rows, beat)
@@ -160,13 +147,8 @@ def _searched(plan: Plan, rows: Profiles) -> Profiles:
 
 def _floored(plan: Plan, rows: Profiles, each: int) -> Profiles:
     """Return rows as they open, without what shines all the time, so many of them for the shortest flash."""
-    return _without_floor(_laid_out(plan, rows, each))
-
-
-def _laid_out(plan: Plan, rows: Profiles, each: int) -> Profiles:
-    """Return rows as they open, so many of them for the shortest flash."""
     rows = rows.turned() if first_guess(plan).upward else rows
-    return rows.binned(_rows_for(plan, rows, each))
+    return _without_floor(rows.binned(_rows_for(plan, rows, each)))
 
 
 def _rows_for(plan: Plan, rows: Profiles, each: int) -> int:

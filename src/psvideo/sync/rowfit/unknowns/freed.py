@@ -17,9 +17,8 @@ from psvideo.sync.rowfit.unknowns.likelier import (
     may_be_feigned,
     moved_by_s,
 )
-from psvideo.sync.rowfit.unknowns.slow_leds import is_softer, may_hide_tails, tails_freed, tells_tails
+from psvideo.sync.rowfit.unknowns.slow_leds import is_softer, may_hide_tails, tails_freed
 from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, blurred_s, cleared, within_blur
-from psvideo.sync.rowfit.unknowns.untold_tails import untold_tails_s
 
 
 def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
@@ -55,8 +54,6 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
     if only_shutter and within_blur(rows, first.beat, fit.beat) and cleared(plan, rows, first, fit) < BELIEVED:
         blur_s = BLURRED * (soft_s or blurred_s(plan, rows, first))
         return Freed(fit=first, unsure_s=float(np.hypot(blur_s, hidden_s)), soft_s=soft_s)
-    if not (soft_s or tells_tails(plan) or may_hide_tails(plan, rows, fit)):
-        hidden_s = float(np.hypot(hidden_s, untold_tails_s(plan, rows, fit, moves=False)))
     unsure_s = float(np.hypot(unsure_s, hidden_s))
     if not (soft_s or set(TAILS) & set(free)):
         unsure_s = float(np.hypot(unsure_s, BLURRED * blurred_s(plan, rows, fit)))

@@ -8,11 +8,11 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit
+from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.likelier import STILL, Freed, has_moved, loss_of, taken_away
 from psvideo.sync.rowfit.unknowns.softness import FEIGNED, cleared, plausible
-from psvideo.sync.rowfit.unknowns.untold_tails import tails_tried, untold_tails_s
+from psvideo.sync.rowfit.unknowns.untold_tails import untold_tails_s
 
 SLOWER, SLOWER_SHARE = 10.0, 5e-3
 """What tails must take away of the robust loss beyond what a blur does, and which share of it; alone they must do more
@@ -22,12 +22,9 @@ LONGER = 2.0
 """The longer tail must be this many times the blur that is found beside both, also where tails without that blur fit
 better: its shape is only nearly that of the model. Compression feigned 2.5 at most in 239 of 240 clips (and 3.4 in the
 last), mostly below 1.8; tails through H.264 were 3.2 and more."""
-NO_BLUR = 0.5
-"""Where a blur alone takes away less than this share of what tails do, the picture is not blurred, and tails need not
-be longer than what is found beside them: uncompressed 0 to 0.3, through H.264 0.8 to 1.2, with tails or without."""
-WORTH = 1.0
-"""What a rise and a fall that are alike must take away of the robust loss to be worth freeing: they leave the length of
-a flash as it is, so that small ones change nothing to the first order."""
+SOFTER, WORTH = (0.02, 0.06, 0.18), 1.0
+"""Tails, as shares of the shortest flash, that are tried where rise and fall are alike: they leave the length of a
+flash as it is, so that small ones change nothing to the first order. Freeing them must take away so much at least."""
 FIRST_BLUR_ROWS = 0.3
 """A blur is looked for from here: from far too large a one, rows that it spoils count as outliers, and it stays."""
 SOFT = 3.0
@@ -63,8 +60,7 @@ def tails_freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tai
     beyond = taken_away(plan, rows, fit, both) - by_blur
     likelier = gain > by_blur and beyond > max(SLOWER, SLOWER_SHARE * loss_of(rows, fit))
     taken = both if taken_away(plan, rows, slow, both) > WORTH else slow
-    sharp = by_blur < NO_BLUR * gain
-    if likelier and (sharp or _longer(taken, joint)) and has_moved(fit, both, tails):
+    if likelier and _longer(taken, joint) and has_moved(fit, both, tails):
         apart_s = float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both)))
         if cleared(plan, rows, fit, taken) < FEIGNED:
             apart_s = float(np.hypot(apart_s, UNTOLD * rms_apart_s(rows, fit.beat, taken.beat)))
@@ -77,7 +73,7 @@ def _hidden_s(plan: Plan, rows: Profiles, fit: Fit, slow: Fit) -> float:
     """Return by how much times are in doubt because tails that the picture does not show may be there all the same: as
     far as a fit with tails moves them, but no farther than rows make likely."""
     moved_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, slow.beat), _more_s(fit, slow)))
-    return min(moved_s, untold_tails_s(plan, rows, fit, moves=True))
+    return min(moved_s, untold_tails_s(plan, rows, fit))
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
@@ -95,17 +91,19 @@ def _more_s(one: Fit, other: Fit) -> float:
 
 
 def is_softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
-    """Return whether flashes that rise and fall as slowly, and start earlier by that, fit better; False where the plan
-    tells tails, of which a change shows to the first order."""
-    return not tells_tails(plan) and bool(tails_tried(plan, rows, fit)[1].min() < -WORTH)
-
-
-def tells_tails(plan: Plan) -> bool:
-    """Return whether the plan says how slowly LEDs rise or fall."""
-    return max(plan.rise_s, plan.fall_s) > 0.0
+    """Return whether flashes that rise and fall as slowly, and start earlier by that, fit better."""
+    limit = loss_of(rows, fit) - WORTH
+    for share in SOFTER:
+        tail_s = share * plan.shortest_flash_s
+        beat = fit.beat.with_phase(fit.beat.clock.phase_s - tail_s)
+        beat = replace(beat, rise_s=beat.rise_s + tail_s, fall_s=beat.fall_s + tail_s)
+        if robust_loss(rows, unexplained(plan, rows, beat), fit.rest) < limit:
+            return True
+    return False
 
 
 def may_hide_tails(plan: Plan, rows: Profiles, fit: Fit) -> bool:
     """Return whether LEDs may rise and fall slowly without the picture or the plan showing it: the subject moves."""
     plain = replace(rows, restless=None)
-    return not tells_tails(plan) and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
+    told = max(plan.rise_s, plan.fall_s) > 0.0
+    return not told and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
