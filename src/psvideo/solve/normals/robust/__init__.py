@@ -14,6 +14,6 @@
 
 Where a subject is not matte, ``reflectance`` takes points of it (``subject_points``), ``reflectance_fit`` finds which
 kind of ``reflectance_model`` fits them (its loops are ``reflectance_kernel`` and ``point_sums``), and ``reflecting``
-solves its pixels again with that, by what the model shows there (``reflected_light``) and
-gains with the normal (``reflected_gain``).
+solves its pixels again with that, by what the model shows there (``reflected_light``) and gains
+with the normal (``reflected_gain``).
 """

@@ -7,9 +7,10 @@ means of what was solved there and of a plane through those around, each counted
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Doubles, Floats, Mask
+from psvideo.model.arrays import Doubles, Floats, Indices, Mask
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.trust.moving_doubt import at_points
 
@@ -44,7 +45,7 @@ def continued(surface: Surface, moves: Mask, *, limit_deg: float) -> Surface:
     if not asked.any() or not (surface.valid & there).any():
         return surface
     stride = max(round(error.shape[1] / moves.shape[1] / FINEST), 1)
-    part = _Part.around(asked, surface, surface.valid & there, stride)
+    part = _Part.around(asked, (surface, error), surface.valid & there, stride)
     normal, error_deg, takes = part.looked_at(limit_deg)
     rows, cols = (part.places[takes] + np.array(part.corner, np.uint32)).T
     surface.normals[rows, cols] = normal[takes].astype(surface.normals.dtype)
@@ -60,7 +61,7 @@ class _Part:
     row, col), the mean albedo, ``level``, and ``error`` in degrees, (row, col); and what is ``sure``, of which every
     ``stride``-th pixel in rows and columns is looked at."""
 
-    places: np.ndarray
+    places: Indices
     corner: tuple[int, int]
     normals: Floats
     level: Floats
@@ -69,13 +70,12 @@ class _Part:
     stride: int
 
     @classmethod
-    def around(cls, asked: Mask, surface: Surface, sure: Mask, stride: int) -> "_Part":
-        reach = REACH_PX * stride
+    def around(cls, asked: Mask, given: tuple[Surface, NDArray[np.floating]], sure: Mask, stride: int) -> "_Part":
+        """Return what lies around what is ``asked`` (row, col) of a surface, which is ``given`` with its errors."""
+        (surface, error), reach = given, REACH_PX * stride
         spans = [np.flatnonzero(asked.any(axis=axis)) for axis in (1, 0)]
         part = tuple(slice(max(int(span[0]) - reach, 0), int(span[-1]) + reach + 1) for span in spans)
-        albedo, error = surface.albedo[part].astype(np.float32), surface.error_deg
-        if error is None:
-            raise ValueError("a surface with errors expected")
+        albedo = surface.albedo[part].astype(np.float32)
         return cls(
             places=np.argwhere(asked[part]).astype(np.uint32),
             corner=(part[0].start, part[1].start),
