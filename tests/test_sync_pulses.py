@@ -39,6 +39,19 @@ def test_a_rise_and_a_fall_that_are_alike_are_found_though_no_flash_seems_longer
     assert [timing.rise_s, timing.fall_s] == pytest.approx([2e-5, 2e-5], rel=0.1)
 
 
+@pytest.mark.parametrize("tail_rows", [0.0, 0.1, 0.2])
+def test_tails_of_a_part_of_a_row_are_found_or_claimed_where_nothing_moves(
+    tail_rows: float, make_plan: PlanMaker
+) -> None:
+    """All flashes were up to 0.14 row late where 0.005 was claimed."""
+    plan = make_plan(height_px=160, width_px=COLUMNS)
+    tail_s = tail_rows * plan.camera.row_time_s
+    shot = shoot(replace(plan, rise_s=tail_s, fall_s=tail_s))
+    timing = timing_of(plan, shot)
+    assert rms_rows(timing, shot, plan) < 3 * timing.phase_error_rows
+    assert timing.phase_error_rows < 0.08
+
+
 @pytest.mark.parametrize(("rise_s", "fall_s"), [(2e-5, 6e-5)])
 def test_tails_far_shorter_than_the_time_from_row_to_row_are_found(
     rise_s: float, fall_s: float, make_plan: PlanMaker

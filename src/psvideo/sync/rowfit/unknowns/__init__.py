@@ -2,7 +2,7 @@
 
 - of the plan: ``freed`` (exposure, readout and tails that it has wrong), where that is ``likelier``; ``far_exposure``
   (one that no small step finds), ``slow_leds`` with ``softness`` (tails, or rows that compression blurs) and
-  ``untold_tails`` (those that no row shows),
+  ``untold_tails`` (those that rows hardly show, or not at all),
   ``plan_errors`` (what stays in doubt of values that are not free)
 - of the footage: ``curve`` (its transfer curve is a little off, by what ``small_steps`` would explain), ``misread``
   (it has another curve altogether)

@@ -17,7 +17,7 @@ from psvideo.sync.rowfit.unknowns.likelier import (
     may_be_feigned,
     moved_by_s,
 )
-from psvideo.sync.rowfit.unknowns.slow_leds import is_softer, may_hide_tails, tails_freed
+from psvideo.sync.rowfit.unknowns.slow_leds import hinted_s, is_softer, may_hide_tails, tails_freed
 from psvideo.sync.rowfit.unknowns.softness import BELIEVED, BLURRED, blurred_s, cleared, within_blur
 
 
@@ -54,6 +54,8 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
     if only_shutter and within_blur(rows, first.beat, fit.beat) and cleared(plan, rows, first, fit) < BELIEVED:
         blur_s = BLURRED * (soft_s or blurred_s(plan, rows, first))
         return Freed(fit=first, unsure_s=float(np.hypot(blur_s, hidden_s)), soft_s=soft_s)
+    if not soft_s:
+        hidden_s = float(np.hypot(hidden_s, hinted_s(plan, rows, fit)))
     unsure_s = float(np.hypot(unsure_s, hidden_s))
     if not (soft_s or set(TAILS) & set(free)):
         unsure_s = float(np.hypot(unsure_s, BLURRED * blurred_s(plan, rows, fit)))

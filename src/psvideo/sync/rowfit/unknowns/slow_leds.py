@@ -8,11 +8,18 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.compiled_profiles import unexplained
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, Fit, robust_loss
+from psvideo.sync.rowfit.refine import LEAST_BLUR_ROWS, TAILS, Fit, robust_loss
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.likelier import STILL, Freed, has_moved, loss_of, taken_away
 from psvideo.sync.rowfit.unknowns.softness import FEIGNED, cleared, plausible
-from psvideo.sync.rowfit.unknowns.untold_tails import untold_tails_s
+from psvideo.sync.rowfit.unknowns.untold_tails import (
+    NO_BLUR,
+    hinted_tails_s,
+    open_tails_s,
+    shows_tails,
+    untold_tails_s,
+    with_tails,
+)
 
 SLOWER, SLOWER_SHARE = 10.0, 5e-3
 """What tails must take away of the robust loss beyond what a blur does, and which share of it; alone they must do more
@@ -60,7 +67,8 @@ def tails_freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tai
     beyond = taken_away(plan, rows, fit, both) - by_blur
     likelier = gain > by_blur and beyond > max(SLOWER, SLOWER_SHARE * loss_of(rows, fit))
     taken = both if taken_away(plan, rows, slow, both) > WORTH else slow
-    if likelier and _longer(taken, joint) and has_moved(fit, both, tails):
+    sharp = by_blur < NO_BLUR * gain
+    if likelier and (sharp or _longer(taken, joint)) and has_moved(fit, both, tails):
         apart_s = float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both)))
         if cleared(plan, rows, fit, taken) < FEIGNED:
             apart_s = float(np.hypot(apart_s, UNTOLD * rms_apart_s(rows, fit.beat, taken.beat)))
@@ -94,16 +102,34 @@ def is_softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
     """Return whether flashes that rise and fall as slowly, and start earlier by that, fit better."""
     limit = loss_of(rows, fit) - WORTH
     for share in SOFTER:
-        tail_s = share * plan.shortest_flash_s
-        beat = fit.beat.with_phase(fit.beat.clock.phase_s - tail_s)
-        beat = replace(beat, rise_s=beat.rise_s + tail_s, fall_s=beat.fall_s + tail_s)
+        beat = with_tails(fit.beat, share * plan.shortest_flash_s)
         if robust_loss(rows, unexplained(plan, rows, beat), fit.rest) < limit:
             return True
-    return False
+    return _stands_still(plan, rows, fit) and shows_tails(plan, rows, fit)
 
 
 def may_hide_tails(plan: Plan, rows: Profiles, fit: Fit) -> bool:
     """Return whether LEDs may rise and fall slowly without the picture or the plan showing it: the subject moves."""
     plain = replace(rows, restless=None)
-    told = max(plan.rise_s, plan.fall_s) > 0.0
-    return not told and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
+    return not _tells_tails(plan) and gain_of(plain, unexplained(plan, plain, fit.beat, fit.weight)) < STILL
+
+
+def hinted_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return by how much times are in doubt where nothing moves because of tails that rows hint at, or because those
+    that were found may be longer or shorter than their own errors say."""
+    if not _stands_still(plan, rows, fit):
+        return 0.0
+    if set(TAILS) & set(fit.errors_s):
+        return float(np.sqrt(max(open_tails_s(plan, rows, fit) ** 2 - fit.shift_error_s**2, 0.0)))
+    return hinted_tails_s(plan, rows, fit)
+
+
+def _stands_still(plan: Plan, rows: Profiles, fit: Fit) -> bool:
+    """Return whether tails that the plan does not tell would show: nothing moves, and rows open one after another."""
+    if _tells_tails(plan) or rows.restless is not None or fit.beat.row_time_s == 0.0:
+        return False
+    return gain_of(rows, unexplained(plan, rows, fit.beat, fit.weight)) >= STILL
+
+
+def _tells_tails(plan: Plan) -> bool:
+    return max(plan.rise_s, plan.fall_s) > 0.0
