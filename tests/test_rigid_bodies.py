@@ -1,24 +1,22 @@
 """A body that turns moves every point along a curved way; six numbers tell all of them, and plates of all lights tell
 the numbers."""
 
-import math
-
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.spatial.transform import Rotation
 from sketched_pairs import pairs_around, sketched
+from turning_ball import FLASHES_S, RADIUS_PX, SHAPE, SPOTS, TURN, UNITS, ball, lights, pairs, surface_of, turned
 
-from psvideo.model.arrays import Doubles, Flags, Floats
-from psvideo.model.rig import Light
-from psvideo.plates.align.as_they_are import Lamps
-from psvideo.plates.align.by_surface import BySurface
+from psvideo.model.arrays import Doubles, Flags
 from psvideo.plates.align.rigid import with_bodies as bodies
+from psvideo.plates.align.rigid.bodies import RigidBody
 from psvideo.plates.align.rigid.flow_fit import motion_of_flow
-from psvideo.plates.align.rigid.moving_parts import parts_of
+from psvideo.plates.align.rigid.left_along import LeftAlong
+from psvideo.plates.align.rigid.moving_parts import MovingPart, parts_of
+from psvideo.plates.align.rigid.plates_seen import PlatesSeen
 from psvideo.plates.align.rigid.rigid_motion import BodyPoints, RigidMotion
 from psvideo.plates.align.rigid.seen_depth import depth_of
 from psvideo.plates.align.rigid.with_bodies import with_bodies
@@ -26,19 +24,6 @@ from psvideo.plates.align.velocity.all_lights import AllLights
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at
-
-SHAPE, COUNT, RADIUS_PX = (160, 192), 5, 62.0
-FLASHES_S = 1 / (COUNT + 1) * (np.arange(COUNT) - (COUNT - 1) / 2)
-TURN = np.radians([-6.0, 15.0, 4.0])
-"""How fast the ball turns, right, down and to the camera: 17 degrees and up to 18 px in a round."""
-UNITS = np.array([1, 1, *[1 / RADIUS_PX] * 4])
-
-
-def turned(places: Doubles, spin: Doubles, time_s: float) -> Doubles:
-    """Places (point, 3: right, down, near) after a turn. With a third axis towards the camera these axes are
-    left-handed: SciPy's rotations are told in right-handed ones, right, down and away."""
-    away = np.array([1, 1, -1])
-    return np.asarray(Rotation.from_rotvec(-spin * away * time_s).apply(places * away) * away)
 
 
 @settings(deadline=None)
@@ -76,14 +61,6 @@ def test_plates_of_what_turns_are_taken_along_curved_ways() -> None:
     assert not kept.way(0.5).any()
 
 
-def ball(middle: tuple[float, float] = (0, 0), radius_px: float = RADIUS_PX) -> tuple[Flags, Doubles]:
-    """Where a ball is, and its points from its middle, right, down, near (row, col, 3), in radii."""
-    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(np.float64)
-    x, y = (x - (SHAPE[1] - 1) / 2 - middle[0]) / radius_px, (y - (SHAPE[0] - 1) / 2 - middle[1]) / radius_px
-    depth = np.sqrt(np.maximum(1 - x * x - y * y, 0))
-    return np.asarray(depth > 0), np.stack([x, y, depth], axis=-1)
-
-
 @pytest.mark.parametrize("scale", [1.0, 0.3])
 def test_the_depth_of_a_ball_is_found_from_its_normals_of_any_length(scale: float) -> None:
     inside, points = ball()
@@ -112,45 +89,6 @@ def test_a_motion_is_found_in_velocities_of_which_many_are_wrong(wrong: float) -
     velocity[:, rng.random(400) < wrong] *= 0.3
     found = motion_of_flow(points, velocity, UNITS)
     np.testing.assert_allclose(found.numbers / UNITS, true / UNITS, atol=0.1 if wrong else 0.01)
-
-
-def lights() -> list[Light]:
-    around = [2 * math.pi * n / COUNT + 0.3 for n in range(COUNT)]
-    return [Light(name=f"l{n}", direction=(0.7 * math.cos(a), 0.7 * math.sin(a), 0.71)) for n, a in enumerate(around)]
-
-
-SPOTS = cv2.GaussianBlur(np.random.default_rng(5).normal(size=(400, 800)), (0, 0), 4)
-
-
-def painted(points: Doubles, spin: Doubles, time_s: float) -> Floats:
-    """The paint of a ball's points where it turned so long."""
-    before = turned(points.reshape(-1, 3), spin, -time_s).reshape(points.shape)
-    angle = np.arctan2(before[..., 0], before[..., 2])
-    places = ((angle / math.pi + 1) % 2 * 400).astype(np.float32), ((before[..., 1] + 1) * 199).astype(np.float32)
-    spots = (SPOTS / SPOTS.std()).astype(np.float32)
-    shown = cv2.remap(spots, *places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-    return np.asarray(np.clip(0.5 + 0.15 * shown, 0.1, 0.9), np.float32)
-
-
-def seen(light: int, time_s: float, spin: Doubles) -> Sketch:
-    """A light's sketch of the ball before an even wall."""
-    inside, points = ball()
-    direction = np.array(lights()[light].direction)
-    shaded = painted(points, spin, time_s) * np.maximum(points * [1, -1, 1] @ direction, 0)
-    noise = np.random.default_rng([light, int(1e4 * (time_s + 9))]).normal(0, 0.002, SHAPE)
-    image = np.asarray(np.where(inside, shaded, 0.3 * direction[2]) + noise, np.float32)
-    return sketched(image, light, time_s)
-
-
-def pairs(spin: Doubles = TURN) -> dict[str, Pair]:
-    """Every light's plates before and after the instant 0."""
-    return pairs_around(lambda light, time_s: seen(light, time_s, spin), FLASHES_S)
-
-
-def surface_of(shown: dict[str, Pair]) -> BySurface:
-    by_surface = BySurface.of(Lamps.of(lights(), [*shown]), shown, {})
-    assert by_surface is not None
-    return by_surface
 
 
 def with_and_without(shown: dict[str, Pair], still: Flags | None = None) -> tuple[Followed, Followed]:
@@ -216,6 +154,52 @@ def test_two_halves_that_pass_each_other_are_no_body(monkeypatch: pytest.MonkeyP
     half = len(inner) // 2 - 6
     assert np.median(np.abs(inner[:half] - 8)) < 0.3
     assert np.median(np.abs(inner[-half:] + 8)) < 0.3
+
+
+def sliding_before_a_wall(light: int, time_s: float) -> Sketch:
+    """A painted relief that slides to the right before a bare, even wall."""
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(np.float32)
+    x, y = x - SHAPE[1] / 2 - 8 * np.float32(time_s), y - SHAPE[0] / 2
+    shown = cv2.remap((SPOTS / SPOTS.std()).astype(np.float32), x + 300, y + 200, cv2.INTER_LINEAR)
+    normal = np.stack([0.3 * np.sin(x / 9), 0.3 * np.cos(y / 7), np.ones_like(x)], axis=-1)
+    direction = np.array(lights()[light].direction)
+    shaded = (0.5 + 0.1 * shown) * (normal / np.linalg.norm(normal, axis=-1, keepdims=True) @ direction)
+    there = (np.abs(x) < 50) & (np.abs(y) < 45)
+    return sketched(np.asarray(np.where(there, shaded, 0.3 * direction[2]), np.float32), light, time_s)
+
+
+def test_a_bare_wall_does_not_slide_with_what_slides_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Along any way it is as even as at rest; here a body is looked for however little is left."""
+    monkeypatch.setattr(bodies, "LITTLE", np.float32(0))
+    found, told = with_and_without(pairs_around(sliding_before_a_wall, FLASHES_S))
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]] - np.array(SHAPE).reshape(2, 1, 1) / 2
+    assert told.moves[(np.abs(x) < 40) & (np.abs(y) < 40)].mean() > 0.95
+    beside = (np.abs(x) > 66) | (np.abs(y) > 57)
+    assert told.moves[beside].mean() <= found.moves[beside].mean() + 0.005
+
+
+def test_of_two_bodies_at_one_place_the_one_that_explains_more_is_taken() -> None:
+    shown = pairs_around(lambda light, time_s: passing(light, time_s, -8), FLASHES_S)
+    lights_seen, none, every = AllLights.of([*shown.values()], 0.0), np.zeros(SHAPE, np.bool_), np.ones(SHAPE, np.bool_)
+    still = Followed(time_s=0.0, velocity=np.zeros((2, *SHAPE), np.float32), moves=none, rests=every)
+    plates = PlatesSeen.of(surface_of(shown), lights_seen, 1.5)
+    before = bodies._Before.of(lights_seen, plates, still, bodies._Rest.of(lights_seen, plates, still))
+    part, points = MovingPart(found=every, within=every, about=every), BodyPoints.of(np.zeros(SHAPE, np.float32), every)
+    ways = [RigidMotion(numbers=np.array([right, 0.0, 0, 0, 0, 0])) for right in (8.0, 6.5)]
+    two = [RigidBody(part=part, points=points, motion=way) for way in ways]
+    for order in (two, two[::-1]):
+        inner = bodies._joined(still, order, before, none).velocity[0, 8:-8, 16:-16]
+        assert np.median(inner[: len(inner) // 2 - 6]) == 8
+
+
+@pytest.mark.parametrize(("equal", "taken"), [(0.9, 0.9 + 0.05), (0.7, 0.05)])
+def test_what_leaves_as_little_counts_only_where_most_of_a_part_is_one_body(equal: float, taken: float) -> None:
+    """Of the pixels a share is left as before, a twentieth clearly better, and the rest worse."""
+    place, every = np.linspace(0, 1, 1000, endpoint=False)[None], np.ones((1, 1000), np.bool_)
+    before = LeftAlong(wide=np.full((1, 1000), 0.5, np.float32), told=every)
+    wide = np.where(place < equal, 0.5, np.where(place < equal + 0.05, 0.4, 0.9)).astype(np.float32)
+    part = MovingPart(found=every, within=every, about=every)
+    assert bodies._holds(LeftAlong(wide=wide, told=every), before, part).mean() == pytest.approx(taken)
 
 
 def test_parts_are_the_largest_things_that_move_and_hold_what_lies_within_them() -> None:

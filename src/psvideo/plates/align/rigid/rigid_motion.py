@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Doubles, Flags, Floats
 
 NUMBERS = 6
+SPIN = slice(2, 5)
+"""Where the numbers of the rotation are."""
 
 Pixels = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Rows and columns of some pixels."""
@@ -58,6 +60,11 @@ class RigidMotion:
 
     numbers: Doubles
 
+    @property
+    def spin(self) -> Doubles:
+        """The rotation about right, down and near, in radians per second."""
+        return self.numbers[SPIN]
+
     def velocity(self, points: BodyPoints) -> Floats:
         """Return the velocity of points in the picture, x right and y down, (2, ...), in pixels per second."""
         right, down, about_right, about_down, about_near, grows = (np.float32(one) for one in self.numbers)
@@ -68,7 +75,7 @@ class RigidMotion:
     def bend(self, points: BodyPoints) -> Floats:
         """Return how fast that changes as the body turns on, (2, ...), in pixels per square second: the acceleration
         w (w P) - P w^2 of a point P under a rotation w."""
-        spin = self.numbers[2:5].astype(np.float32)
+        spin = self.spin.astype(np.float32)
         along = spin[0] * points.right + spin[1] * points.down + spin[2] * points.near
         square = np.square(spin).sum()
         return np.stack([spin[0] * along - square * points.right, spin[1] * along - square * points.down])

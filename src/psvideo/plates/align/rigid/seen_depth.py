@@ -40,7 +40,7 @@ def depth_of(normals: Floats, there: Flags) -> Floats:
     inside = _shrunk(there.astype(np.float32), size) > HALF
     if not inside.any():
         return np.zeros(there.shape, np.float32)
-    near = _beside(_integrated(right, down, inside), inside)
+    near = beside(_integrated(right, down, inside), inside)
     full = cv2.resize(near.astype(np.float32), there.shape[::-1], interpolation=cv2.INTER_LINEAR)
     return np.asarray(np.where(there, full, 0), np.float32)
 
@@ -73,7 +73,7 @@ def _edges(number: NDArray[np.intp], slope: Floats) -> Edges:
     return number[:, :-1][both], number[:, 1:][both], step.astype(np.float64)
 
 
-def _beside(depth: Doubles, inside: Flags) -> Doubles:
+def beside(depth: Doubles, inside: Flags) -> Doubles:
     """Return the depth of pixels ``inside`` and, beside them, of the nearest one, (row, col)."""
     outside = (~inside).astype(np.uint8)
     labels = cv2.distanceTransformWithLabels(outside, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)[1]
