@@ -13,6 +13,7 @@ from turning_ball import RADIUS_PX, SHAPE, TURN, UNITS, ball, pairs, surface_of,
 
 from psvideo.model.arrays import Doubles, Floats
 from psvideo.plates.align.by_surface import CLIPPED, LEAST_LIT
+from psvideo.plates.align.rigid import joint_fit
 from psvideo.plates.align.rigid.along_kernel import PLANES, UNLIKE
 from psvideo.plates.align.rigid.along_motion import AlongMotion, InPicture, left_of
 from psvideo.plates.align.rigid.depth_blocks import DepthBlocks
@@ -212,6 +213,31 @@ def test_depth_and_motion_that_are_wrong_are_brought_back_together(deep: float, 
     assert relief_off_px(found) < 0.7 * relief_off_px(start)
     np.testing.assert_allclose(found.motion.numbers[2:5] / UNITS[2:5], true.numbers[2:5] / UNITS[2:5], atol=1.0)
     assert np.abs(found.blocks.off_px).mean() > 0.1, "it is kept, for pictures that are less smooth"
+
+
+def test_a_step_of_motion_and_depth_is_that_of_all_unknowns_at_once(turning: tuple[AllLights, PlatesSeen]) -> None:
+    """Eliminating depth first gives what one dense system of six numbers and every block gives."""
+    part, pixels = body_part(), np.nonzero(body_part().found)
+    pixels = pixels[0][::9], pixels[1][::9]
+    now = moving(true_points(part, 0.8), TRUE.changed(UNITS * 0.3), part)
+    now = replace(now, blocks=replace(now.blocks, off_px=np.sin(np.arange(len(now.blocks.off_px)))))
+    by, by_px = joint_fit._step(now, pixels, turning[1], UNITS)
+    seen, block, count = InPicture.of(now.points, *pixels), now.blocks.at(pixels), len(now.blocks.off_px)
+    along = AlongMotion.of(now.motion, seen, turning[1])
+    nearer = now.motion.spin[1] * along.slopes[0] - now.motion.spin[0] * along.slopes[1]
+    grows = np.zeros((6 + count, *nearer.shape))
+    grows[:6] = along.steps(seen.points.per_number(), UNITS)
+    grows[6 + block, :, np.arange(block.size)] = nearer.T
+    counts = along.weight / np.bincount(block, minlength=count)[block] / UNLIKE**2
+    columns, values = grows.reshape(6 + count, -1), np.asarray(along.values * counts).ravel()
+    squares = (columns * np.tile(counts, len(nearer))) @ columns.T
+    squares[:6, :6] += joint_fit.FIRM * np.diag(np.diag(squares)[:6])
+    squares[6:, 6:] += now.blocks.even @ np.eye(count) + joint_fit.LEAST * np.eye(count)
+    pull = -columns @ values
+    pull[6:] -= now.blocks.even @ now.blocks.off_px
+    both = np.linalg.solve(squares, pull)
+    np.testing.assert_allclose(by, both[:6], atol=0.01 * np.abs(both[:6]).max())
+    np.testing.assert_allclose(by_px, both[6:], atol=0.01 * np.abs(both[6:]).max())
 
 
 def test_depth_departs_more_freely_where_it_is_steep() -> None:
