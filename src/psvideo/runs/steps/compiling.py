@@ -93,6 +93,7 @@ def solve_small() -> None:
     for one in PICTURES:
         solve_images(one.images, one.rig)
     _draw_an_outline()
+    _leave_a_point()
 
 
 def compile_ahead(*, watch: Watch = unwatched) -> None:
@@ -155,6 +156,14 @@ def _draw_an_outline() -> None:
 
     unknown, ways = np.full((2, 1, 1), -1, np.int32), np.full((2, 1, 1), FAR)
     nearest_surfaces(np.ones((1, 1, 1), np.float32), np.ones((1, 1), np.float32), 0.0, 0.0, unknown, ways)
+
+
+def _leave_a_point() -> None:
+    """Ask what one surface leaves of a point's plates, as runs do where something turns."""
+    from psvideo.plates.align.rigid.along_kernel import PLANES, along_points
+
+    dark, lamps, place = np.zeros((4, 2, 2, 3), np.float32), np.ones((4, 4), np.float32), np.zeros((6, 1), np.float32)
+    along_points(dark, lamps, place, 0, 1, np.zeros((2, 1), np.float32), np.zeros((PLANES, 4, 1), np.float32))
 
 
 def _as_floats(frames: Path) -> None:
