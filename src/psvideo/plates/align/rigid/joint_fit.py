@@ -20,6 +20,7 @@ from psvideo.plates.align.rigid.plates_seen import PlatesSeen
 from psvideo.plates.align.rigid.rigid_motion import NUMBERS, BodyPoints, Pixels, RigidMotion
 
 MOST_POINTS = 3000
+"""So many points are asked at most."""
 STEPS, FARTHEST, FARTHEST_PX = 6, 3.0, 10.0
 """So many steps, in each of which no number changes by more units, and no depth by more pixels."""
 FIRM, LEAST = 0.01, 1e-6

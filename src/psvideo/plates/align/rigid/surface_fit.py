@@ -1,8 +1,8 @@
 """The rigid motion along which the plates of all lights, before an instant and after it, show one surface that turns.
 
-Six numbers of the body are fitted to what is left of the plates at a few thousand points (``along_motion``): by Gauss
-and Newton's steps, damped as Levenberg and Marquardt do, with the weights of Geman and McClure's function. Pictures are
-smoothed, first a lot, so that it starts from far.
+Six numbers of the body are fitted to what is left of the plates at a thousand points (``along_motion``): by Gauss and
+Newton's steps, damped as Levenberg and Marquardt do, with the weights of Geman and McClure's function. It starts from
+far, in smooth pictures; from there on depth is fitted as well (``joint_fit``).
 """
 
 import numpy as np
