@@ -13,9 +13,10 @@ from bench.accuracy_motion import ASLANT, BOX, UNALIGNED, filmed, turn
 
 from psvideo.model.rig import Light, Rig
 from psvideo.plates.align import rounds
-from psvideo.plates.align.as_they_are import BothWays, Lamps, fits_as_it_is, stands_under
+from psvideo.plates.align.as_they_are import BothWays, fits_as_it_is, stands_under
 from psvideo.plates.align.as_they_are_kernel import CLIPPED, leave_rows
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, light_of
 from psvideo.plates.align.velocity.followed import Followed
@@ -42,13 +43,16 @@ def codes_of(light: np.ndarray) -> np.ndarray:
     return np.searchsorted(light_of(EVERY_CODE), light).clip(0, 255).astype(np.uint8)
 
 
-def test_what_is_left_is_that_of_a_least_squares_fit_of_the_lights_that_show_both() -> None:
+@pytest.mark.parametrize("shape", [(5, 1, 1), (5, 12, 16)], ids=["distant lights", "near lights"])
+def test_what_is_left_is_that_of_a_least_squares_fit_of_the_lights_that_show_both(shape: tuple[int, ...]) -> None:
     rng = np.random.default_rng(4)
     rest, moved = rng.integers(70, 256, (2, 5, 12, 16), np.uint8)
     moved[:, :4] = rest[:, :4]  # nothing to choose between
     light, least = light_of(EVERY_CODE).astype(np.float64) * np.full((5, 1), 0.8), np.full(5, 0.1)
     left = np.full((3, 12, 16), np.nan, np.float32)
-    leave_rows(rest, moved, light, MATRIX, least, np.array([1e-3, 2e-3, 3e-3, 0.05]), 0, 12, left)
+    evening = rng.uniform(0.5, 2, shape).astype(np.float32)
+    leave_rows(rest, moved, light, MATRIX, evening, least, np.array([1e-3, 2e-3, 3e-3, 0.05]), 0, 12, left)
+    evening = np.broadcast_to(evening, (5, 12, 16))
     told = 0
     for row, col in np.ndindex(12, 16):
         own, theirs = (light[np.arange(5), each[:, row, col]] for each in (rest, moved))
@@ -57,11 +61,14 @@ def test_what_is_left_is_that_of_a_least_squares_fit_of_the_lights_that_show_bot
             assert not left[:, row, col].any()
             continue
         told += 1
-        fits = [np.linalg.lstsq(MATRIX[lit], each[lit]) for each in (own, theirs)]
+        even = evening[lit, row, col]
+        variance = np.square(even) * (2e-3 * own[lit] + 3e-3)
+        own, theirs = own[lit] * even, theirs[lit] * even
+        fits = [np.linalg.lstsq(MATRIX[lit], each) for each in (own, theirs)]
         squares = [np.square(fit[0]).sum().clip(0.05**2) for fit in fits]
         expected = [min(float(fit[1].sum()) / square, 1.0) for fit, square in zip(fits, squares, strict=True)]
         np.testing.assert_allclose(left[:2, row, col], expected, rtol=1e-4, atol=1e-6)
-        noise = (2e-3 * own[lit] + 3e-3).mean() / squares[0]
+        noise = variance.mean() / squares[0]
         np.testing.assert_allclose(left[2, row, col], (lit.sum() - 3) * (1e-3 + noise), rtol=1e-4)
     assert told > 50
 
@@ -110,15 +117,6 @@ def test_one_point_by_itself_does_not_stay() -> None:
         codes[10, 15] = other.codes[10, 15]
         both.append(BothWays(rest=own, moved=replace(own, codes=codes)))
     assert not fits_as_it_is(lamps, both).any()
-
-
-def test_three_lights_and_lights_of_unknown_place_tell_nothing() -> None:
-    near = replace(LIGHTS[0], direction=None, position_m=(0.0, 0.5, 0.0))
-    assert Lamps.of(LIGHTS[:4], NAMES[:4]) is not None
-    assert Lamps.of(LIGHTS[:3], NAMES[:3]) is None
-    assert Lamps.of((), NAMES) is None
-    assert Lamps.of((near, *LIGHTS[1:]), NAMES) is None
-    assert Lamps.of(LIGHTS[1:], NAMES) is None
 
 
 @pytest.mark.parametrize(("unmixing", "lights"), [(None, LIGHTS), ("by colour", ())])

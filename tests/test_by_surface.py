@@ -9,8 +9,8 @@ from sketched_pairs import pairs_around, sketched
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.model.rig import Light
-from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.by_surface import BySurface
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving import followed_at

@@ -5,9 +5,10 @@ import pytest
 
 from psvideo.model.arrays import Flags
 from psvideo.model.rig import Light
-from psvideo.plates.align.as_they_are import MATTE, Lamps
+from psvideo.plates.align.as_they_are import MATTE
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.left_out import AtInstant, better_without
+from psvideo.plates.align.plate_lamps import Lamps
 
 COUNT, CODE, WHITE, SHARE = 8, 150, 0.8, 0.25
 LIT = WHITE * ((CODE / 255 * (np.sqrt(1.02) - np.sqrt(0.02)) + np.sqrt(0.02)) ** 2 - 0.02)

@@ -91,11 +91,13 @@ def test_a_motion_is_found_in_velocities_of_which_many_are_wrong(wrong: float) -
     np.testing.assert_allclose(found.numbers / UNITS, true / UNITS, atol=0.1 if wrong else 0.01)
 
 
-def with_and_without(shown: dict[str, Pair], still: Flags | None = None) -> tuple[Followed, Followed]:
+def with_and_without(
+    shown: dict[str, Pair], still: Flags | None = None, *, near: bool = False
+) -> tuple[Followed, Followed]:
     """What flow finds, and that with bodies."""
     found = followed_at([*shown.values()], 0.0)
     none = np.zeros(SHAPE, np.bool_) if still is None else still
-    return found, with_bodies(surface_of(shown), AllLights.of([*shown.values()], 0.0), found, none)
+    return found, with_bodies(surface_of(shown, near=near), AllLights.of([*shown.values()], 0.0), found, none)
 
 
 def off_px(found: Followed, spin: Doubles = TURN) -> float:
@@ -116,6 +118,20 @@ def test_a_painted_ball_goes_along_its_curved_ways_where_flow_is_held_back_by_sh
     assert off_px(found) > 5 * off_px(told)
     straight = Followed(time_s=0.0, velocity=told.velocity, moves=told.moves, rests=told.rests)
     assert off_px(straight) > 1.1 * off_px(told)
+
+
+def test_so_it_does_under_three_lights_whose_plates_before_and_after_check_each_other() -> None:
+    seen = pairs()
+    found, told = with_and_without({name: seen[name] for name in ("l0", "l2", "l3")})
+    assert off_px(told) < 0.6
+    assert off_px(found) > 3 * off_px(told)
+
+
+def test_so_it_does_under_near_lights() -> None:
+    """What they send differs by a factor of three over the ball, and in direction by 19 degrees."""
+    found, told = with_and_without(pairs(near=True), near=True)
+    assert off_px(told) < 0.6
+    assert off_px(found) > 3 * off_px(told)
 
 
 def test_what_is_still_stays_and_a_bare_wall_beside_is_not_carried_along() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.rig import Light
 from psvideo.model.surface import Surface
-from psvideo.plates.align.as_they_are import Lamps
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.shake.camera_path import CameraPath, camera_path
 from psvideo.plates.align.shake.registered import registered

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from psvideo.plates.align.doubt.turning import MOST_DEG, arc_deg
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, light_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.lit_plates import LitPlates
@@ -33,7 +34,7 @@ def arc_between(turns_deg: tuple[float, float]) -> float:
     for toward in TOWARD:
         before, after = (codes(0.7 * STRENGTH * float(facing(turn_deg) @ toward)) for turn_deg in turns_deg)
         ends.append((before, after, WHITE))
-    return float(arc_deg(TOWARD * STRENGTH, ends)[20, 30])
+    return float(arc_deg(Lamps(names=tuple("abcde"), matrix=TOWARD * STRENGTH), ends)[20, 30])
 
 
 @pytest.mark.parametrize("turned_deg", [10.0, 20.0, 30.0])

@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 from sketched_pairs import pairs_around, sketched
 
 from psvideo.model.arrays import Doubles, Flags, Floats
+from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
-from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.by_surface import BySurface
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Pair
 
@@ -41,6 +42,35 @@ def lights() -> list[Light]:
     return [Light(name=f"l{n}", direction=(0.7 * math.cos(a), 0.7 * math.sin(a), 0.71)) for n, a in enumerate(around)]
 
 
+FAR_M, PIXELS_PER_M, LAMPS_M = 1.2, 500.0, 1.5
+
+
+def near_lights() -> list[Light]:
+    """As many, at a distance of twelve of the ball's radii."""
+    middle_m = np.array([0, 0, -FAR_M])
+    places_m = [middle_m + LAMPS_M * np.array(light.direction) for light in lights()]
+    return [
+        Light(name=light.name, position_m=(float(x), float(y), float(z)), intensity=(LAMPS_M**2,))
+        for light, (x, y, z) in zip(lights(), places_m, strict=True)
+    ]
+
+
+def ground() -> Ground:
+    """A plane through the ball's middle, of which the picture shows 0.4 m."""
+    return Ground(
+        depth_m=np.full(SHAPE, FAR_M, np.float32),
+        middle_m=np.array([0, 0, -FAR_M]),
+        focal_px=(FAR_M * PIXELS_PER_M,) * 2,
+        principal_px=((SHAPE[1] - 1) / 2, (SHAPE[0] - 1) / 2),
+    )
+
+
+def towards_near(light: int, points: Doubles) -> Doubles:
+    """What a near light sends to points (row, col, 3) of a ball in the picture's middle, right, up and near."""
+    away_m = np.array(near_lights()[light].position_m) - (points * RADIUS_PX / PIXELS_PER_M - [0, 0, FAR_M])
+    return np.asarray(LAMPS_M**2 * away_m / np.linalg.norm(away_m, axis=-1, keepdims=True) ** 3)
+
+
 SPOTS = cv2.GaussianBlur(np.random.default_rng(5).normal(size=(400, 800)), (0, 0), 4)
 
 
@@ -54,22 +84,24 @@ def painted(points: Doubles, spin: Doubles, time_s: float) -> Floats:
     return np.asarray(np.clip(0.5 + 0.15 * shown, 0.1, 0.9), np.float32)
 
 
-def seen(light: int, time_s: float, spin: Doubles) -> Sketch:
-    """A light's sketch of the ball before an even wall."""
+def seen(light: int, time_s: float, spin: Doubles, *, near: bool = False) -> Sketch:
+    """A light's sketch of the ball before an even wall; of a near light, or of a distant one."""
     inside, points = ball()
-    direction = np.array(lights()[light].direction)
-    shaded = painted(points, spin, time_s) * np.maximum(points * [1, -1, 1] @ direction, 0)
+    direction, normals = np.array(lights()[light].direction), points * [1, -1, 1]
+    sent = towards_near(light, normals) if near else direction
+    shaded = painted(points, spin, time_s) * np.maximum((normals * sent).sum(axis=-1), 0)
     noise = np.random.default_rng([light, int(1e4 * (time_s + 9))]).normal(0, 0.002, SHAPE)
     image = np.asarray(np.where(inside, shaded, 0.3 * direction[2]) + noise, np.float32)
     return sketched(image, light, time_s)
 
 
-def pairs(spin: Doubles = TURN) -> dict[str, Pair]:
+def pairs(spin: Doubles = TURN, *, near: bool = False) -> dict[str, Pair]:
     """Every light's plates before and after the instant 0."""
-    return pairs_around(lambda light, time_s: seen(light, time_s, spin), FLASHES_S)
+    return pairs_around(lambda light, time_s: seen(light, time_s, spin, near=near), FLASHES_S)
 
 
-def surface_of(shown: dict[str, Pair]) -> BySurface:
-    by_surface = BySurface.of(Lamps.of(lights(), [*shown]), shown, {})
+def surface_of(shown: dict[str, Pair], *, near: bool = False) -> BySurface:
+    lamps = Lamps.of(near_lights(), [*shown], ground()) if near else Lamps.of(lights(), [*shown])
+    by_surface = BySurface.of(lamps, shown, {})
     assert by_surface is not None
     return by_surface

@@ -87,7 +87,7 @@ def solve(
     plan, clip = take.plan, take.clip
     lights = lights_as_planned(rig, plan)
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
-    how = Aligning(align=align, lights=() if unmixing else lights)
+    how = Aligning(align=align, lights=() if unmixing else lights, ground=None if near is None else near.ground)
     masks = None if mask is None else Masks(still=mask)
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
     if solving.looks_at_subject(len(lights)):

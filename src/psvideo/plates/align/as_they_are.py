@@ -10,15 +10,14 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags
-from psvideo.model.rig import Light, directions
 from psvideo.plates.align.as_they_are_kernel import SOLVED, leave_rows
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.pixel_sources import Taken
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.all_lights import STILL_SHARE
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, SCALE, light_of
 from psvideo.plates.align.velocity.flow import TOE, all_of, comparable
@@ -34,24 +33,6 @@ WINDOW_PX, AROUND_PX = 3, 7
 LEAST_LIT = 0.03
 """What shows less light, as a share of white, is in shadow."""
 BAND_PIXELS = 1 << 15
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lamps:
-    """The distant lights of plates: ``matrix`` (light, 3), directions times strengths, by ``names``."""
-
-    names: tuple[str, ...]
-    matrix: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, lights: Sequence[Light], names: Sequence[str]) -> "Lamps | None":
-        """Return the lamps of plates with these names, None where they are not known as distant, or too few to tell."""
-        known = {light.name: light for light in lights if light.direction is not None}
-        if len(names) <= SOLVED or any(name not in known for name in names):
-            return None
-        chosen = [known[name] for name in names]
-        strengths = np.array([np.mean(light.by_channel) for light in chosen])
-        return cls(names=tuple(names), matrix=directions(chosen) * strengths[:, None])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +65,10 @@ def fits_as_it_is(lamps: Lamps, lights: Sequence[BothWays]) -> Flags:
     variance = (2 * noise / SCALE) ** 2
     floor = LEAST_LIT * whites.max() / np.linalg.norm(lamps.matrix, axis=1).mean()
     factors = np.array([MATTE**2, 2 * variance * whites.mean(), 2 * variance * TOE * whites.mean() ** 2, floor])
-    left = np.empty((3, *rest.shape[1:]), np.float32)
+    left, evening = np.empty((3, *rest.shape[1:]), np.float32), lamps.evenings(rest.shape[1:])
 
     def run(first: int, last: int) -> None:
-        leave_rows(rest, moved, light, lamps.matrix, LEAST_LIT * whites, factors, first, last, left)
+        leave_rows(rest, moved, light, lamps.matrix, evening, LEAST_LIT * whites, factors, first, last, left)
 
     over_ranges(run, left.shape[1], each=max(BAND_PIXELS // left.shape[2], 1))
     own, theirs, usual = (cv2.blur(plane, (WINDOW_PX, WINDOW_PX)) for plane in left)

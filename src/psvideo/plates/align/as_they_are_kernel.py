@@ -18,8 +18,8 @@ MOST = 1.0
 
 @FUSED.kept
 def leave_rows(
-    rest: Codes8, moved: Codes8, light: Doubles, matrix: Doubles, least: Doubles, factors: Doubles, first: int,
-    last: int, left: Floats,
+    rest: Codes8, moved: Codes8, light: Doubles, matrix: Doubles, evening: Floats, least: Doubles, factors: Doubles,
+    first: int, last: int, left: Floats,
 ) -> None:  # fmt: skip
     """Fill rows of ``left`` (3, row, col) where plates ``rest`` and ``moved`` (light, row, col) differ; 0 elsewhere.
 
@@ -42,10 +42,12 @@ def leave_rows(
                 p, q = light[k, a], light[k, b]
                 if p <= least[k] or q <= least[k] or a >= CLIPPED or b >= CLIPPED:
                     continue
+                even = evening[k, min(row, evening.shape[1] - 1), min(col, evening.shape[2] - 1)]
+                noise += even * even * (factors[1] * p + factors[2])
+                p, q = p * even, q * even
                 lit += 1
                 own += p * p
                 their += q * q
-                noise += factors[1] * p + factors[2]
                 x, y, z = matrix[k, 0], matrix[k, 1], matrix[k, 2]
                 sums[0] += x * x
                 sums[1] += x * y

@@ -13,7 +13,7 @@ import numpy as np
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Doubles, Flags, Floats
-from psvideo.plates.align.as_they_are import Lamps
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.all_lights import FINE_PX, WINDOW_PX, AllLights
 from psvideo.plates.align.velocity.brightness import light_of
 from psvideo.plates.align.velocity.flow import Sketch
@@ -84,6 +84,7 @@ class BySurface:
 
     places: tuple[int | None, ...]
     standing: tuple[Codes8 | None, ...]
+    lamps: Lamps
     matrix: Doubles
     odd: Doubles
 
@@ -103,13 +104,21 @@ class BySurface:
         return cls(
             places=tuple(order.index(name) if name in pairs else None for name in lamps.names),
             standing=tuple(still.get(name) for name in lamps.names),
+            lamps=lamps,
             matrix=matrix,
             odd=np.linalg.svd(matrix)[0][:, 3:].T,
         )
 
+    @property
+    def checked(self) -> bool:
+        """Whether one instant's light can tell that no surface explains it: under three lights one always does."""
+        return len(self.odd) > 0
+
     def chosen(self, lights: AllLights, proposals: Sequence[Floats], found: Followed, still: Flags) -> Followed:
         """Return what was ``found`` with velocities of the ``proposals`` where these bring plates to one surface, and
         what was found does not. What is ``still`` (row, col) stays."""
+        if not self.checked:
+            return found
         none = self.left(lights, np.zeros_like(found.velocity))
         before = none.least(self.left(lights, found.velocity, found.bend)) if found.moves.any() else none
         asked = before.known & ~still & (before.wide > MARGIN)
@@ -216,13 +225,13 @@ class BySurface:
         if len(plates) == 1:
             size = lights.shape[::-1]
             still = cv2.resize(plates[0].codes, size, interpolation=cv2.INTER_AREA)[::stride, ::stride]
-            return light_of(still.astype(np.float32))
+            return light_of(still.astype(np.float32)) * self.lamps.evening(light, still.shape)
         total = np.zeros([-(-length // stride) for length in lights.shape], np.float32)
         for plate in plates:
             out, way = np.empty_like(total), mean_velocity(velocity, bend, plate.span_s)
             moved_rows(plate.codes, np.float32(plate.span_s), way, stride, 0, len(out), out)
             total += np.float32(plate.counts) * light_of(out)
-        return total
+        return total * self.lamps.evening(light, total.shape)
 
 
 def _clearly(best: SurfaceLeft, before: SurfaceLeft) -> Flags:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.arrays import Flags, Floats
-from psvideo.plates.align.as_they_are import MATTE, Lamps
+from psvideo.plates.align.as_they_are import MATTE
 from psvideo.plates.align.as_they_are_kernel import FLAT
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.brightness import light_of
 
 LEAST_SHARE = 1e-3
@@ -56,13 +57,16 @@ def better_without(lamps: Lamps, lights: Sequence[AtInstant], used: Flags) -> Fl
     if not len(rows):
         return better
     some = used[:, rows, cols]
+    evening = lamps.evenings(better.shape)
+    evening = evening[:, np.minimum(rows, evening.shape[1] - 1), np.minimum(cols, evening.shape[2] - 1)]
     squares = np.stack([light.squares(rows, cols, own) for light, own in zip(lights, some, strict=True)])
+    squares *= np.square(evening)
     _, firsts, which = np.unique(np.packbits(some, axis=0), axis=1, return_index=True, return_inverse=True)
     sets, every = some[:, firsts], np.ones((len(used), 1), np.bool_)
     few_pulls, pulls = _pulls(lamps, sets), _pulls(lamps, every)
     few = (_spread(few_pulls)[:, which.ravel()] * squares).sum(axis=0)
     better[rows, cols] = few < (_spread(pulls) * squares).sum(axis=0)
-    shown = np.stack([light.light(rows, cols) for light in lights])
+    shown = np.stack([light.light(rows, cols) for light in lights]) * evening
     uneven = []
     for each, of_set in ((few_pulls, which.ravel()), (pulls, np.zeros_like(rows))):
         normals = np.zeros((*better.shape, 3), np.float32)

@@ -21,8 +21,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from psvideo.model.arrays import Flags, Floats
-from psvideo.plates.align.as_they_are import Lamps
 from psvideo.plates.align.packed import PutBy, packed
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch, changed, sketch_of, white_of
 from psvideo.plates.align.velocity.followed import Followed

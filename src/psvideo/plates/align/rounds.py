@@ -12,11 +12,11 @@ import numpy as np
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.model.choices import Align, Rate
+from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
 from psvideo.plates.align.as_they_are import (
     AsTheyAre,
     BothWays,
-    Lamps,
     fits_as_it_is,
     nearest_of,
     seen_by_all,
@@ -33,6 +33,7 @@ from psvideo.plates.align.light_history import Around, DueInstant, Held
 from psvideo.plates.align.own_ways import along_own_ways
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.pixel_sources import Taken, taken_of, without_doubtful
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.rigid.with_bodies import with_bodies
 from psvideo.plates.align.shake.steadied import Steadied, steady_at
 from psvideo.plates.align.velocity.all_lights import AllLights
@@ -58,6 +59,7 @@ class Aligning:
     align: Align = "auto"
     rate: Rate | Comb = "round"
     lights: tuple[Light, ...] = ()
+    ground: Ground | None = None
 
     @property
     def leaves_plates(self) -> bool:
@@ -103,7 +105,7 @@ def aligned(
         with_ambient=with_ambient,
         whites={} if whites is None else whites,
         put_by=put_by,
-        lamps=Lamps.of(how.lights, lights),
+        lamps=Lamps.of(how.lights, lights, how.ground),
     )
     return _slid(plates, held, how, first, schedule)
 
@@ -263,7 +265,7 @@ def _better_without(held: Held, instant: DueInstant, taken: dict[str, Taken]) ->
     """Return what says of the lights that are used, (light, row, col) of those taken, where a normal of them and of
     what stands is better than one of all; None where the lights do not tell."""
     motion, lamps, lights = instant.motion, held.lamps, list[AtInstant]()
-    if lamps is None or motion is None:
+    if lamps is None or not lamps.checked or motion is None:
         return None
     for light in held.lights:
         sketch, shape = held.shots[light][instant.round].sketch, motion.moves.shape
@@ -293,7 +295,7 @@ def _as_they_are(
     seen = seen_by_all([*pairs.values()], motion)
     stands = stands_under(motion, len(held.lights)) & seen
     nowhere = AsTheyAre(fits=np.zeros((1, 1), np.bool_), stands=stands)
-    if held.lamps is None:
+    if held.lamps is None or not held.lamps.checked:
         return nowhere
     ways, both = dict(zip(pairs, shown, strict=True)), []
     for light in held.lights:
@@ -329,7 +331,7 @@ def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: S
 def _arc_deg(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes8]) -> Floats | None:
     """Return by how many degrees normals may be off because what is blended turns between two plates of a light, (row,
     col); None where the lights do not tell."""
-    if held.lamps is None:
+    if held.lamps is None or not held.lamps.checked:
         return None
     ends, shape = list[PlateEnds](), sources[0].shape
     for light in held.lights:
@@ -342,7 +344,7 @@ def _arc_deg(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: 
     if len(ends) < len(held.lights):
         return None
     blended = np.any([source == BOTH for source in sources], axis=0)
-    return np.asarray(arc_deg(held.lamps.matrix, ends) * blended, np.float32)
+    return np.asarray(arc_deg(held.lamps, ends) * blended, np.float32)
 
 
 def _moved_to(

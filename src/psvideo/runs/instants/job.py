@@ -88,7 +88,9 @@ class Job:
         how = self.over_time.aligning
         if self.take.unmixing is not None:
             return how
-        return replace(how, lights=lights_as_planned(self.lighting.rig, self.take.plan))
+        near = self.lighting.near
+        lights = lights_as_planned(self.lighting.rig, self.take.plan)
+        return replace(how, lights=lights, ground=None if near is None else near.ground)
 
     @property
     def asked(self) -> AskedPasses:

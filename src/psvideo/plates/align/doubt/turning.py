@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.model.arrays import Codes8, Floats
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.brightness import EVERY_CODE, light_of
 
 WINDOW_PX = (5, 5)
@@ -28,17 +28,17 @@ PlateEnds = tuple[Codes8, Codes8, float]
 """A light's codes before and after an instant, (row, col), moved to it, and the light of the brightest."""
 
 
-def arc_deg(matrix: NDArray[np.float64], ends: Sequence[PlateEnds]) -> Floats:
+def arc_deg(lamps: Lamps, ends: Sequence[PlateEnds]) -> Floats:
     """Return by how many degrees normals may be off because they turned between the plates of the lights, (row, col):
     the height of the arc, which goes with the square of the angle between the normals of what lights show before the
     instant and after it. ``matrix`` (light, 3) are directions times strengths, and ``ends`` come in their order."""
-    pulls = np.linalg.pinv(matrix).T.astype(np.float32)
+    pulls = np.linalg.pinv(lamps.matrix).T.astype(np.float32)
     shape = ends[0][0].shape
     normals = np.zeros((2, 3, *shape), np.float32)
-    for pull, (before, after, white) in zip(pulls, ends, strict=True):
+    for pull, own, (before, after, white) in zip(pulls, lamps.evenings(shape), ends, strict=True):
         light = (np.float32(white) * light_of(EVERY_CODE)).astype(np.float32)
         for whole, codes in zip(normals, (before, after), strict=True):
-            shown = cv2.blur(cv2.LUT(codes, light), WINDOW_PX)
+            shown = cv2.blur(cv2.LUT(codes, light), WINDOW_PX) * own
             for plane, share in zip(whole, pull, strict=True):
                 plane += share * shown
     lengths = [np.sqrt(np.square(each).sum(axis=0)) for each in normals]

@@ -34,9 +34,12 @@ class PlatesSeen:
         plates = [(light, plate) for light in range(len(surface.places)) for plate in surface.plates(lights, light)]
         pictures = np.empty((len(plates), *lights.shape, 3), np.float32)
 
+        evening = [surface.lamps.evening(light, lights.shape) for light in range(len(surface.places))]
+
         def show(number: int, _: int) -> None:
             small = cv2.resize(plates[number][1].codes, lights.shape[::-1], interpolation=cv2.INTER_AREA)
-            light = cv2.GaussianBlur(np.asarray(cv2.LUT(small, table), np.float32), (0, 0), smooth_px)
+            shown = np.asarray(cv2.LUT(small, table), np.float32) * evening[plates[number][0]]
+            light = cv2.GaussianBlur(shown, (0, 0), smooth_px)
             pictures[number, ..., 0] = light
             for plane, axis in ((1, (1, 0)), (2, (0, 1))):
                 pictures[number, ..., plane] = cv2.Sobel(light, cv2.CV_32F, *axis, ksize=3, scale=1 / 8)

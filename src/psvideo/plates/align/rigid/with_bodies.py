@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.model.arrays import Flags, Floats
-from psvideo.plates.align.by_surface import BySurface, SurfaceLeft
+from psvideo.plates.align.by_surface import BySurface
 from psvideo.plates.align.rigid.bodies import RigidBody
 from psvideo.plates.align.rigid.left_along import LeftAlong
 from psvideo.plates.align.rigid.moving_parts import MovingPart, parts_of
@@ -25,6 +25,8 @@ SMOOTH_PX = (4.0, 1.5)
 is asked of the last."""
 LITTLE = np.float32(0.02)
 """What was found is left as it is where it leaves less: noise does."""
+LITTLE_OF_BOTH = np.float32(0.05)
+"""So is it under three lights, where it leaves less of the plates before and after: what slides leaves 0.02 to 0.04."""
 AS_OWN, BEYOND, HOLDS = np.float32(1.05), np.float32(0.01), 0.8
 """A body's motion leaves as little as the velocity that was found, where it leaves less than the first times as much,
 and the second: where it does in more than the third of what was found of the body, it is one."""
@@ -42,8 +44,7 @@ AS_UNLIKE = np.float32(1.1)
 def with_bodies(surface: BySurface, lights: AllLights, found: Followed, still: Flags) -> Followed:
     """Return what was ``found`` with the motion of rigid bodies, and its bend, where that explains the plates of all
     lights. What is ``still`` (row, col) stays."""
-    before = surface.left(lights, found.velocity, found.bend)
-    if not any(_leaves_much(before, part.found) for part in parts_of(found)):
+    if not _leaves_much(surface, lights, found):
         return found
     levels = [PlatesSeen.of(surface, lights, smooth_px) for smooth_px in SMOOTH_PX]
     round_s, rest = float(lights.spans_s.sum(axis=1).mean()), _Rest.of(lights, levels[-1], found)
@@ -69,10 +70,17 @@ class _Rest:
         return cls(left=LeftAlong.of(lights, plates, plates.at_rest, none), unlike=unlike)
 
 
-def _leaves_much(left: SurfaceLeft, there: Flags) -> bool:
-    """Return whether what was found ``there`` (row, col) leaves enough that a body's motion may leave less."""
-    tells = there & left.known
-    return not tells.any() or bool(left.wide[tells].mean() > LITTLE)
+def _leaves_much(surface: BySurface, lights: AllLights, found: Followed) -> bool:
+    """Return whether some part of what was ``found`` leaves enough that a body's motion may leave less."""
+    if surface.checked:
+        at_once = surface.left(lights, found.velocity, found.bend)
+        wide, known, little = at_once.wide, at_once.known, LITTLE
+    else:
+        plates = PlatesSeen.of(surface, lights, SMOOTH_PX[-1])
+        along = LeftAlong.of(lights, plates, plates.at_rest, found)
+        wide, known, little = along.wide, along.told, LITTLE_OF_BOTH
+    told = [wide[part.found & known] for part in parts_of(found)]
+    return any(not one.size or bool(one.mean() > little) for one in told)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Codes8, Doubles, Floats
-from psvideo.plates.align.as_they_are import Lamps
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.shake.by_paint import places_by_paint
 from psvideo.plates.align.shake.one_surface import OneSurface
 from psvideo.plates.align.shake.registered import registered, roughly, shifted
@@ -85,7 +85,11 @@ def camera_path(pairs: Sequence[Pair], lamps: Lamps | None = None) -> CameraPath
     firsts = np.cumsum([0, *(len(each) for each in details[:-1])])
     places, painted = places_by_paint(times, [one for each in details for one in each], firsts, shifts)
     found = places if painted else None
-    if lamps is not None and (sure := _by_surface(lamps, pairs, shifts, places[firsts], scale)) is not None:
+    if (
+        lamps is not None
+        and lamps.checked
+        and (sure := _by_surface(lamps, pairs, shifts, places[firsts], scale)) is not None
+    ):
         found = sure
     if found is None:
         return None
@@ -99,6 +103,7 @@ def _by_surface(
     """Return the places of all flashes, (flash, 2), where one surface explains them; None where none does. ``shifts``
     (light, 2) are those between each pair, and ``guess`` where the first of it may be."""
     light = [_light(pair, way, scale) for pair, way in zip(pairs, shifts, strict=True)]
+    light = [one * own for one, own in zip(light, lamps.evenings(light[0].shape), strict=True)]
     surface = OneSurface.of(light, [pair.before.white for pair in pairs], lamps.matrix)
     none = np.zeros_like(shifts)
     firsts = min((surface.refined(way) for way in (none, guess - guess.mean(axis=0))), key=surface.left)
