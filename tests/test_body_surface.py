@@ -12,7 +12,10 @@ from hypothesis.extra.numpy import arrays
 from turning_ball import RADIUS_PX, SHAPE, TURN, UNITS, ball, pairs, surface_of, turned
 
 from psvideo.model.arrays import Doubles, Floats
+from psvideo.model.irradiance.ground import Ground
+from psvideo.model.rig import Light
 from psvideo.plates.align.by_surface import CLIPPED, LEAST_LIT
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.rigid import joint_fit
 from psvideo.plates.align.rigid.along_kernel import PLANES, UNLIKE
 from psvideo.plates.align.rigid.along_motion import AlongMotion, InPicture, left_of
@@ -20,6 +23,7 @@ from psvideo.plates.align.rigid.depth_blocks import DepthBlocks
 from psvideo.plates.align.rigid.joint_fit import MovingPoints, fitted_together
 from psvideo.plates.align.rigid.left_along import LeftAlong
 from psvideo.plates.align.rigid.moving_parts import MovingPart
+from psvideo.plates.align.rigid.near_plates import NearPlates
 from psvideo.plates.align.rigid.plates_seen import PlatesSeen
 from psvideo.plates.align.rigid.rigid_motion import BodyPoints, RigidMotion
 from psvideo.plates.align.rigid.surface_fit import motion_of_surface
@@ -28,6 +32,8 @@ from psvideo.plates.align.velocity.all_lights import AllLights
 from psvideo.plates.align.velocity.followed import Followed
 
 TRUE = RigidMotion(numbers=np.array([0.0, 0.0, *TURN, 0.0]))
+NEAR_M = 0.75
+"""Six of the ball's radii."""
 
 
 def some_plates(rng: np.random.Generator, count: int = 7) -> PlatesSeen:
@@ -56,11 +62,12 @@ def test_the_loop_leaves_what_least_squares_leave_of_plates_that_are_lit(seed: i
     rng = np.random.default_rng(seed)
     plates, spin = some_plates(rng), rng.normal(size=3)
     lamps = plates.turned(RigidMotion(numbers=np.array([0, 0, *spin, 0.0])))
-    places = np.concatenate([rng.uniform(-1, 11, (2, 40)), rng.normal(0, 3, (4, 40))]).astype(np.float32)
+    places = np.concatenate([rng.uniform(-1, 11, (2, 40)), rng.normal(0, 3, (4, 40)), np.zeros((1, 40))])
+    places = places.astype(np.float32)
     told = np.empty((PLANES, 7, 40), np.float32)
     left, beyond = left_of(plates, lamps, places, told)
     asked = 0
-    for point, (col, row, *ways) in enumerate(places.T):
+    for point, (col, row, *ways) in enumerate(places[:6].T):
         velocity, bend = np.array(ways[:2]), np.array(ways[2:])
         at = [np.array([col, row]) - span_s * velocity + span_s**2 / 2 * bend for span_s in plates.spans_s]
         light = np.array([shown(picture, y, x) for picture, (x, y) in zip(plates.pictures, at, strict=True)])
@@ -79,6 +86,72 @@ def test_the_loop_leaves_what_least_squares_leave_of_plates_that_are_lit(seed: i
         np.testing.assert_allclose(told[1:3, lit, point].T, slopes, atol=scale)
         assert not told[:, ~lit, point].any(), "what is dark or clipped tells nothing"
     assert asked >= 10
+
+
+SLANTED = Ground(
+    depth_m=1.1 + np.outer(np.linspace(-0.1, 0.15, 18), np.ones(22)).astype(np.float32),
+    middle_m=np.array([0.04, -0.02, -1.1]),
+    focal_px=(40.0, 40.0),
+    principal_px=(10.0, 9.0),
+)
+"""A slanted plane in a picture of 18 x 22 pixels; plates have half as many."""
+
+
+def mixed_lights(rng: np.random.Generator) -> list[Light]:
+    """A distant light, and four near ones, two of which shine in cones."""
+    around = 2 * np.pi * (np.arange(4) + rng.uniform(-0.2, 0.2, 4)) / 4
+    lights = [Light(name="l0", direction=(0.36, -0.48, 0.8), intensity=(0.7,))]
+    for n, (x, y) in enumerate(zip(0.6 * np.cos(around), 0.5 * np.sin(around), strict=True)):
+        place, down = (float(x), float(y), float(rng.uniform(-0.6, -0.3))), np.array([-x, -y, -0.9])
+        light = Light(name=f"l{n + 1}", position_m=place, intensity=(float(rng.uniform(0.5, 2)),))
+        axis = down / np.linalg.norm(down)
+        cone = replace(light, axis=(float(axis[0]), float(axis[1]), float(axis[2])), anisotropy=1.5 + n)
+        lights.append(cone if n < 2 else light)
+    return lights
+
+
+def sent_to(light: Light, point_m: Doubles) -> Doubles:
+    """What a light sends to a point, along right, down and near."""
+    strength, flip = float(light.by_channel[0]), np.array([1, -1, 1])
+    if light.position_m is None:
+        return np.asarray(strength * np.array(light.direction) * flip)
+    away_m = np.array(light.position_m) - point_m
+    far_m = np.linalg.norm(away_m)
+    cone = 1.0 if light.axis is None else max(-away_m @ np.array(light.axis) / far_m, 0) ** float(light.anisotropy or 0)
+    return np.asarray(strength * cone * away_m / far_m**3 * flip)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_near_lamps_light_every_point_from_where_they_stand(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lights, which = mixed_lights(rng), [0, 0, 1, 2, 3, 3, 4]
+    lamps = Lamps.of(lights, [light.name for light in lights], SLANTED)
+    assert lamps is not None
+    near = NearPlates.of(lamps, lamps.matrix, which, (9, 11))
+    given = replace(some_plates(rng), lamps=lamps.matrix[which] * [1, -1, 1], near=near)
+    plates = replace(given, pictures=rng.uniform(0.1, 0.9, given.pictures.shape).astype(np.float32))
+    spin, rows, cols = rng.normal(0, 0.5, 3), rng.integers(0, 9, 30), rng.integers(0, 11, 30)
+    velocity, rises = rng.normal(0, 2, (2, 30)), rng.normal(0, 1, 30).astype(np.float32)
+    places = np.stack([cols, rows, *velocity, *np.zeros((2, 30)), plates.above(rises, (rows, cols))])
+    told, metres_per_px = np.empty((PLANES, 7, 30), np.float32), 1.1 / 20
+    left_of(plates, plates.turned(RigidMotion(numbers=np.array([0, 0, *spin, 0.0]))), places, told)
+    depth_m = SLANTED.depth_m.reshape(9, 2, 11, 2).mean(axis=(1, 3))[rows, cols] - rises * metres_per_px
+    for point in range(30):
+        light, own = [], []
+        for picture, span_s, number in zip(plates.pictures, plates.spans_s, which, strict=True):
+            x, y = np.array([cols[point], rows[point]]) - span_s * velocity[:, point]
+            point_m = depth_m[point] * np.array([(x - 4.75) / 20, -(y - 4.25) / 20, -1])
+            light.append(shown(picture, y, x)[0])
+            own.append(turned(sent_to(lights[number], point_m)[None], spin, span_s)[0])
+        rest = left_by_lstsq(np.array(own), np.array(light)) / np.mean(light)
+        np.testing.assert_allclose(told[0, :, point], rest, atol=0.02 * np.abs(rest).max() + 1e-3)
+
+
+def test_of_distant_lights_none_is_near() -> None:
+    seen = pairs()
+    assert seen_plates(TURN)[1].near is None
+    assert seen_plates(TURN)[1].at_rest.shape == (2 * len(seen), 4)
+    assert seen_plates(TURN, lamps_m=NEAR_M)[1].at_rest.shape == (2 * len(seen), 24)
 
 
 numbers = arrays(np.float64, 3, elements=st.floats(-1, 1))
@@ -108,7 +181,7 @@ def test_what_is_left_grows_with_the_turn_as_the_loop_tells(axis: int) -> None:
     assert ((light > LEAST_LIT) & (light < CLIPPED)).all()
     pictures = np.zeros_like(none.pictures)
     pictures[..., 0] = light[:, None, None]
-    plates, place = replace(none, pictures=pictures), np.array([[1, 1, 0, 0, 0, 0]], np.float32).T
+    plates, place = replace(none, pictures=pictures), np.array([[1, 1, 0, 0, 0, 0, 0]], np.float32).T
     told = [np.empty((PLANES, 8, 1), np.float32) for _ in range(3)]
     turns = np.zeros(6)
     turns[2 + axis] = by
@@ -124,11 +197,11 @@ def turning() -> tuple[AllLights, PlatesSeen]:
     return seen_plates(TURN)
 
 
-def seen_plates(spin: Doubles, smooth_px: float = 1.5) -> tuple[AllLights, PlatesSeen]:
-    """The plates of a ball that turns."""
-    seen = pairs(spin)
+def seen_plates(spin: Doubles, smooth_px: float = 1.5, *, lamps_m: float | None = None) -> tuple[AllLights, PlatesSeen]:
+    """The plates of a ball that turns, under distant lights or some so near."""
+    seen = pairs(spin, lamps_m=lamps_m)
     lights = AllLights.of([*seen.values()], 0.0)
-    return lights, PlatesSeen.of(surface_of(seen), lights, smooth_px)
+    return lights, PlatesSeen.of(surface_of(seen, lamps_m=lamps_m), lights, smooth_px)
 
 
 def body_part() -> MovingPart:
@@ -164,6 +237,15 @@ def test_the_true_motion_leaves_next_to_nothing_and_a_twentieth_off_leaves_more(
         by[number] = 1.0 if number < 2 else 1.0 / RADIUS_PX
         for other in (TRUE.changed(by), TRUE.changed(-by)):
             assert left_along(other, points, part, turning[1]) > 1.5 * least, f"number {number}, off by a pixel"
+
+
+@pytest.mark.parametrize("smooth_px", SMOOTH_PX)
+def test_so_it_does_under_near_lights_which_distant_ones_do_not_explain(smooth_px: float) -> None:
+    part, (_, plates) = body_part(), seen_plates(TURN, smooth_px, lamps_m=NEAR_M)
+    points = true_points(part)
+    least = left_along(TRUE, points, part, plates)
+    assert least < 0.05
+    assert left_along(TRUE, points, part, replace(plates, near=None)) > 3 * least
 
 
 @pytest.mark.parametrize("number", range(5))

@@ -108,7 +108,10 @@ def test_in_the_middle_lamps_shine_as_they_do_there_and_evening_changes_nothing(
 
 
 def test_distant_lights_are_even_alone_and_beside_near_ones() -> None:
-    distant = [Light(name=name, direction=(0.1 * n, 0.3, float(np.sqrt(0.91 - 0.01 * n * n))), intensity=(0.5,)) for n, name in enumerate(NAMES)]
+    distant = [
+        Light(name=name, direction=(0.1 * n, 0.3, float(np.sqrt(0.91 - 0.01 * n * n))), intensity=(0.5,))
+        for n, name in enumerate(NAMES)
+    ]
     lamps = Lamps.of(distant, NAMES)
     assert lamps is not None
     assert lamps.evenings(SHAPE).tolist() == [[[1.0]]] * 5

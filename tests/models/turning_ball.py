@@ -42,15 +42,15 @@ def lights() -> list[Light]:
     return [Light(name=f"l{n}", direction=(0.7 * math.cos(a), 0.7 * math.sin(a), 0.71)) for n, a in enumerate(around)]
 
 
-FAR_M, PIXELS_PER_M, LAMPS_M = 1.2, 500.0, 1.5
+FAR_M, PIXELS_PER_M = 1.2, 500.0
 
 
-def near_lights() -> list[Light]:
-    """As many, at a distance of twelve of the ball's radii."""
+def near_lights(lamps_m: float) -> list[Light]:
+    """As many, so far from the ball's middle: its radius is 0.124 m."""
     middle_m = np.array([0, 0, -FAR_M])
-    places_m = [middle_m + LAMPS_M * np.array(light.direction) for light in lights()]
+    places_m = [middle_m + lamps_m * np.array(light.direction) for light in lights()]
     return [
-        Light(name=light.name, position_m=(float(x), float(y), float(z)), intensity=(LAMPS_M**2,))
+        Light(name=light.name, position_m=(float(x), float(y), float(z)), intensity=(0.7 * lamps_m**2,))
         for light, (x, y, z) in zip(lights(), places_m, strict=True)
     ]
 
@@ -65,10 +65,10 @@ def ground() -> Ground:
     )
 
 
-def towards_near(light: int, points: Doubles) -> Doubles:
+def towards_near(light: int, points: Doubles, lamps_m: float) -> Doubles:
     """What a near light sends to points (row, col, 3) of a ball in the picture's middle, right, up and near."""
-    away_m = np.array(near_lights()[light].position_m) - (points * RADIUS_PX / PIXELS_PER_M - [0, 0, FAR_M])
-    return np.asarray(LAMPS_M**2 * away_m / np.linalg.norm(away_m, axis=-1, keepdims=True) ** 3)
+    away_m = np.array(near_lights(lamps_m)[light].position_m) - (points * RADIUS_PX / PIXELS_PER_M - [0, 0, FAR_M])
+    return np.asarray(0.7 * lamps_m**2 * away_m / np.linalg.norm(away_m, axis=-1, keepdims=True) ** 3)
 
 
 SPOTS = cv2.GaussianBlur(np.random.default_rng(5).normal(size=(400, 800)), (0, 0), 4)
@@ -84,24 +84,25 @@ def painted(points: Doubles, spin: Doubles, time_s: float) -> Floats:
     return np.asarray(np.clip(0.5 + 0.15 * shown, 0.1, 0.9), np.float32)
 
 
-def seen(light: int, time_s: float, spin: Doubles, *, near: bool = False) -> Sketch:
-    """A light's sketch of the ball before an even wall; of a near light, or of a distant one."""
+def seen(light: int, time_s: float, spin: Doubles, *, lamps_m: float | None = None) -> Sketch:
+    """A light's sketch of the ball before an even wall; of a light so near, or of a distant one."""
     inside, points = ball()
     direction, normals = np.array(lights()[light].direction), points * [1, -1, 1]
-    sent = towards_near(light, normals) if near else direction
+    sent = direction if lamps_m is None else towards_near(light, normals, lamps_m)
     shaded = painted(points, spin, time_s) * np.maximum((normals * sent).sum(axis=-1), 0)
     noise = np.random.default_rng([light, int(1e4 * (time_s + 9))]).normal(0, 0.002, SHAPE)
     image = np.asarray(np.where(inside, shaded, 0.3 * direction[2]) + noise, np.float32)
     return sketched(image, light, time_s)
 
 
-def pairs(spin: Doubles = TURN, *, near: bool = False) -> dict[str, Pair]:
+def pairs(spin: Doubles = TURN, *, lamps_m: float | None = None) -> dict[str, Pair]:
     """Every light's plates before and after the instant 0."""
-    return pairs_around(lambda light, time_s: seen(light, time_s, spin, near=near), FLASHES_S)
+    return pairs_around(lambda light, time_s: seen(light, time_s, spin, lamps_m=lamps_m), FLASHES_S)
 
 
-def surface_of(shown: dict[str, Pair], *, near: bool = False) -> BySurface:
-    lamps = Lamps.of(near_lights(), [*shown], ground()) if near else Lamps.of(lights(), [*shown])
+def surface_of(shown: dict[str, Pair], *, lamps_m: float | None = None) -> BySurface:
+    given = lights() if lamps_m is None else near_lights(lamps_m)
+    lamps = Lamps.of(given, [*shown], None if lamps_m is None else ground())
     by_surface = BySurface.of(lamps, shown, {})
     assert by_surface is not None
     return by_surface

@@ -6,7 +6,8 @@ need them. ``between`` makes a light's plate at an instant from the two plates a
 and of one of the two ``side_kernel``); ``pixel_sources`` decides which of the two each pixel comes from, and
 ``as_they_are`` (loop in ``as_they_are_kernel``) where nothing is to be moved, since only plates as they are show one
 surface. ``by_surface`` chooses velocities by what the lights' directions tell. ``left_out`` says where a normal is
-better without the lights of which nothing is sure.
+better without the lights of which nothing is sure. ``plate_lamps`` are the lights as these three need them: near ones
+are evened out as if they were distant.
 
 Rooms, from the bottom up:
 

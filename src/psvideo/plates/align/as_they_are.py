@@ -1,8 +1,9 @@
 """Where plates as they are show one surface, and plates brought to an instant do not: nothing is moved there.
 
 Flow that fits by chance, and a blend of two plates between which an edge passed, turn normals. Of four lights and more
-one normal and one albedo tell: they explain the plates of all lights where these show the same surface. Where most
-lights show that nothing passed, what changes under the others is a shadow, and nothing is moved there either.
+one normal and one albedo tell: they explain the plates of all lights where these show the same surface, once what near
+ones send is evened out (``plate_lamps``). Where most lights show that nothing passed, what changes under the others is
+a shadow, and nothing is moved there either.
 """
 
 from collections.abc import Sequence

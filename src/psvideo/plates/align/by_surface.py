@@ -1,8 +1,9 @@
 """Which velocity brings the plates of all lights to one surface: chosen there, piece by piece, where shading misleads.
 
 Shading makes plates of one light, a round apart, look more alike along a false velocity than along the true one where
-things turn. Of four distant lights and more a matte surface explains the plates of all, brought to the instant, only
-where they lie on each other. What some light does not reach tells nothing, and goes along with what is around it.
+things turn. Of four lights and more a matte surface explains the plates of all, brought to the instant, only where they
+lie on each other; what near ones send is evened out before (``plate_lamps``). What some light does not reach tells
+nothing, and goes along with what is around it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -78,9 +79,10 @@ class PlateNear:
 
 @dataclass(frozen=True, kw_only=True)
 class BySurface:
-    """Of every light, the number of its pair of plates, or the ``standing`` sketch under which nothing moves; how
-    a normal times its albedo lights them, ``matrix`` (light, 3); and what no such normal explains of all lights,
-    ``odd`` (some, light): orthonormal rows."""
+    """Of every light, the number of its pair of plates, or the ``standing`` sketch under which nothing moves; the
+    ``lamps``, which even out what near ones send; how a normal times its albedo lights plates that are even, ``matrix``
+    (light, 3); and what no such normal explains of all lights, ``odd`` (some, light): orthonormal rows, none under
+    three."""
 
     places: tuple[int | None, ...]
     standing: tuple[Codes8 | None, ...]

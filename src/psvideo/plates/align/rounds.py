@@ -53,7 +53,8 @@ class Aligning:
 
     ``rate`` says which instants are shown: the middle of every round's flashes, every flash, or those of a steady rate.
     ``lights`` are those of the plates where it is known how they shine: four and more tell where plates as they are
-    show one surface, and plates brought to the instant do not.
+    show one surface, and plates brought to the instant do not; three and more tell how a body moves. Near ones tell it
+    where the ``ground`` is given that they shine on.
     """
 
     align: Align = "auto"

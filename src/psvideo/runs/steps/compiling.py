@@ -162,7 +162,7 @@ def _leave_a_point() -> None:
     """Ask what one surface leaves of a point's plates, as runs do where something turns."""
     from psvideo.plates.align.rigid.along_kernel import PLANES, along_points
 
-    dark, lamps, place = np.zeros((4, 2, 2, 3), np.float32), np.ones((4, 4), np.float32), np.zeros((6, 1), np.float32)
+    dark, lamps, place = np.zeros((4, 2, 2, 3), np.float32), np.ones((4, 4), np.float32), np.zeros((7, 1), np.float32)
     along_points(dark, lamps, place, 0, 1, np.zeros((2, 1), np.float32), np.zeros((PLANES, 4, 1), np.float32))
 
 

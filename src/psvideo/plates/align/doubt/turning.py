@@ -31,7 +31,7 @@ PlateEnds = tuple[Codes8, Codes8, float]
 def arc_deg(lamps: Lamps, ends: Sequence[PlateEnds]) -> Floats:
     """Return by how many degrees normals may be off because they turned between the plates of the lights, (row, col):
     the height of the arc, which goes with the square of the angle between the normals of what lights show before the
-    instant and after it. ``matrix`` (light, 3) are directions times strengths, and ``ends`` come in their order."""
+    instant and after it. ``ends`` come in the order of the ``lamps``."""
     pulls = np.linalg.pinv(lamps.matrix).T.astype(np.float32)
     shape = ends[0][0].shape
     normals = np.zeros((2, 3, *shape), np.float32)

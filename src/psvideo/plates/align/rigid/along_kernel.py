@@ -5,6 +5,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.model.arrays import Floats
+from psvideo.model.irradiance.near_light import LEAST_COSINE as FAINTEST
 from psvideo.plates.align.by_surface import CLIPPED, LEAST_LIT
 
 SOLVED = 3
@@ -16,6 +17,9 @@ FLAT = np.float32(1e-4)
 PLANES = 6
 """What is told of every plate at a point: what is left, how that grows to the right and down, and with the turn about
 three axes."""
+OF_PLATE = 4
+"""What is told of every plate, its time and how it lights a normal; more only of near lights."""
+LEAST_COSINE = np.float32(FAINTEST)
 ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)
 
 
@@ -33,6 +37,24 @@ def _shown(picture: Floats, row: np.float32, col: np.float32, light: Floats, pla
         upper = picture[top, left, plane] * (ONE - across) + picture[top, right, plane] * across
         lower = picture[below, left, plane] * (ONE - across) + picture[below, right, plane] * across
         light[plane, plate] = upper * (ONE - down) + lower * down
+
+
+@FUSED.inlined
+def _shine(near: Floats, right: np.float32, down: np.float32, rises: np.float32, lamps: Floats, plate: int) -> None:
+    """Fill ``lamps`` (plate, 1..3) with how a near light lights a place that so much ``rises`` above the ground's
+    middle; ``near`` (20,) is the light, as told in ``near_plates``, and how the body turned on since its plate."""
+    farther = ONE - rises * near[10]
+    x = near[1] - (right - near[8]) * farther
+    y = near[2] - (down - near[9]) * farther
+    z = near[3] - rises
+    square = x * x + y * y + z * z
+    sends = near[0] / (square * np.sqrt(square))
+    if near[7] != ZERO:
+        cosine = -(x * near[4] + y * near[5] + z * near[6]) / np.sqrt(square)
+        sends *= max(cosine, LEAST_COSINE) ** near[7]
+    for axis in range(3):
+        turn = 11 + 3 * axis
+        lamps[plate, 1 + axis] = sends * (near[turn] * x + near[turn + 1] * y + near[turn + 2] * z)
 
 
 @FUSED.inlined
@@ -92,12 +114,14 @@ def along_points(
     """Fill ``left`` (2, point) and ``told`` (plane, plate, point) of some points.
 
     ``pictures`` (plate, row, col, 3) are light, and how much it grows to the right and down; ``plates`` (plate, 4) are
-    the times from them to the instant, and how they light normals there along right, down and near. ``places`` (6,
-    point) are columns and rows, velocities right and down, and how fast these change. ``left`` is what no normal
+    the times from them to the instant, and how they light normals there along right, down and near; (plate, 24) where
+    some are of near lights, which ``near_plates`` tells. ``places`` (7, point) are columns and rows, velocities right
+    and down, how fast these change, and how much nearer than the ground's middle they are. ``left`` is what no normal
     explains, 0 to 1, and of how many plates more than SOLVED it is told, 0 where not of any; ``told`` has PLANES, as
     shares of the mean light, or none.
     """
-    picture, lamp, place, rest, made = lent(pictures), lent(plates), lent(places), lent(left), lent(told)
+    picture, given, place, rest, made = lent(pictures), lent(plates), lent(places), lent(left), lent(told)
+    lamp, near = given[:, :OF_PLATE].copy(), given.shape[1] > OF_PLATE
     light, lit = np.empty((PLANES, lamp.shape[0]), np.float32), np.empty(lamp.shape[0], np.float32)
     normal, other, inverse = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(6, np.float32)
     for point in range(first, last):
@@ -107,6 +131,8 @@ def along_points(
             col = place[0, point] - span * (place[2, point] - HALF * span * place[4, point])
             row = place[1, point] - span * (place[3, point] - HALF * span * place[5, point])
             _shown(picture[plate], row, col, light, plate)
+            if near and given[plate, OF_PLATE] != ZERO:
+                _shine(given[plate, OF_PLATE:], col, row, place[6, point], lamp, plate)
             seen = LEAST_LIT < light[0, plate] < CLIPPED
             lit[plate] = ONE if seen else ZERO
             count += seen

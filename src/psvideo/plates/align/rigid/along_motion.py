@@ -26,13 +26,13 @@ class InPicture:
     """Some ``points`` (point,) of a body, and their places in the picture, ``row`` and ``col``, in its pixels."""
 
     points: BodyPoints
-    row: Floats
-    col: Floats
+    row: NDArray[np.intp]
+    col: NDArray[np.intp]
 
     @classmethod
     def of(cls, points: BodyPoints, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> "InPicture":
         """Return those pixels of a body's ``points``, (row, col)."""
-        return cls(points=points.at((rows, cols)), row=rows.astype(np.float32), col=cols.astype(np.float32))
+        return cls(points=points.at((rows, cols)), row=rows, col=cols)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,8 @@ class AlongMotion:
         lamps = plates.turned(motion)
         ways = motion.velocity(seen.points), motion.bend(seen.points)
         told = np.empty((PLANES, len(lamps), seen.row.size), np.float32)
-        left, beyond = left_of(plates, lamps, np.stack([seen.col, seen.row, *ways[0], *ways[1]]), told)
+        near = plates.above(seen.points.near, (seen.row, seen.col))
+        left, beyond = left_of(plates, lamps, np.stack([seen.col, seen.row, *ways[0], *ways[1], near]), told)
         tells = beyond > 0
         return cls(
             values=told[0],
@@ -81,8 +82,9 @@ class AlongMotion:
 
 
 def left_of(plates: PlatesSeen, lamps: Floats, places: Floats, told: Floats) -> tuple[Floats, Floats]:
-    """Return what no surface explains of plates under ``lamps`` (plate, 4) at ``places`` (6, point), 0 to 1, and of how
-    many plates more than a normal and an albedo need it is told, both (point,). Fill ``told``, as the loop does."""
+    """Return what no surface explains of plates under ``lamps`` (plate, 4 or more) at ``places`` (7, point), 0 to 1,
+    and of how many plates more than a normal and an albedo need it is told, both (point,). Fill ``told``, as the loop
+    does."""
     left = np.empty((2, places.shape[1]), np.float32)
     own = np.ascontiguousarray(places, np.float32)
 

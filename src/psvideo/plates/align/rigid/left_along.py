@@ -28,17 +28,24 @@ class LeftAlong:
 
     @classmethod
     def of(
-        cls, lights: AllLights, plates: PlatesSeen, lamps: Floats, found: Followed, where: Flags | None = None
+        cls,
+        lights: AllLights,
+        plates: PlatesSeen,
+        lamps: Floats,
+        found: Followed,
+        where: Flags | None = None,
+        near: Floats | None = None,
     ) -> "LeftAlong":
-        """Return that of ``plates`` under ``lamps`` (plate, 4) along the ways that were ``found``, by pixels of
-        ``where`` (row, col), or by all."""
+        """Return that of ``plates`` under ``lamps`` (plate, 4 or more) along the ways that were ``found``, by pixels of
+        ``where`` (row, col), or by all; they are so ``near`` the ground (row, col), or on it."""
         shape = lights.shape
         asked = np.ones(shape, np.bool_) if where is None else where
         asked = asked[::STRIDE, ::STRIDE]
-        rows, cols = (some.astype(np.float32) * STRIDE for some in np.nonzero(asked))
-        ways = [plane[::STRIDE, ::STRIDE][asked] for plane in (*found.velocity, *found.bends)]
+        rows, cols = (some * STRIDE for some in np.nonzero(asked))
+        ways = [plane[rows, cols] for plane in (*found.velocity, *found.bends)]
+        above = plates.above(np.zeros(len(rows), np.float32) if near is None else near[rows, cols], (rows, cols))
         left, beyond = np.zeros((2, *asked.shape), np.float32)
-        left[asked], beyond[asked] = left_of(plates, lamps, np.stack([cols, rows, *ways]), NOTHING)
+        left[asked], beyond[asked] = left_of(plates, lamps, np.stack([cols, rows, *ways, above]), NOTHING)
 
         def over(values: Floats) -> Floats:
             return mean_over(values, odd_width(WINDOW_PX, lights.step * STRIDE))

@@ -105,7 +105,10 @@ class _Before:
         """Return where a body that ``moved`` explains the plates as well as what was found, and what it leaves there,
         (row, col)."""
         part, lamps = body.part, self.plates.turned(body.motion)
-        left, turned = (LeftAlong.of(self.lights, self.plates, lamps, each, part.about) for each in (moved, self.found))
+        left, turned = (
+            LeftAlong.of(self.lights, self.plates, lamps, each, part.about, body.points.near)
+            for each in (moved, self.found)
+        )
         along = self.lights.mean(self.lights.unlike(moved.velocity), WINDOW_PX)
         fits = np.where(left.told, _holds(left, self.own.least(turned), part), along < AS_UNLIKE * self.unlike)
         stirs = np.where(left.told, self.rest.left.wide > STIRS, self.rest.unlike > UNLIKE * self.lights.count)

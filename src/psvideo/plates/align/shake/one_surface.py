@@ -1,7 +1,7 @@
 """How well one surface explains the lights' pictures, each shifted by its own amount: which shifts it explains best.
 
 Paint and outlines show a shift between two lights, but shading and shadows seem shifted too, and another way under
-every light. Of four distant lights and more a matte surface explains the pictures only where they lie on each other.
+every light. Of four lights and more a matte surface explains the pictures only where they lie on each other.
 """
 
 from collections.abc import Sequence
