@@ -94,7 +94,7 @@ def test_a_distance_is_never_surer_than_to_which_surface_it_belongs() -> None:
     points = deep[..., None] * rays(u, v)
     rng = np.random.default_rng(3)
     plates = filmed(RIG, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
-    plates = [plate + rng.normal(0, 0.003, plate.shape).astype(np.float32) for plate in plates]
+    plates = [plate + rng.normal(0, 0.001, plate.shape).astype(np.float32) for plate in plates]
     near = near_surface_of(RIG, RIG.lights, height_px=SIZE, width_px=SIZE)
     assert near is not None
     found: NearSurface = swept(near, RIG.lights, plates)

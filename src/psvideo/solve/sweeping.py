@@ -44,6 +44,13 @@ was measured, and normals say more of the relief than distances do."""
 FOUND, RELIEF = 0.8, 0.1
 """The prior on distances: this share of the picture lies within about this share of distances that were found, the rest
 anywhere."""
+RIGHT = 0.5
+"""The best distance of the usual point costs so much, where lamps stand and shine as the rig says. What is left beyond
+that is the rig's own error, alike in all points: odds count in units of it."""
+PRIOR = 0.5
+"""The best distance is taken with so much of that prior's logarithm, in which the plane is as likely as any: several
+explain a point that four lights reach, or that lies at an edge, nearly alike. With all of it, what is dim is put where
+the most of the picture is."""
 SURE = 0.01
 """Better than to this share no distance is known."""
 JUMP = 0.08
@@ -114,7 +121,9 @@ def _distances(
     costs, reached = _averaged(planes, sound), sound > 0
     if not reached.any():
         return None
-    found = np.where(reached, plane_m * np.exp(_best(costs)), 0).astype(np.float32)
+    before = np.maximum(_beforehand(_best(costs)[reached]), _beforehand(np.zeros(1)))  # or on the plane, surely
+    best = _best(costs - PRIOR * 2 / (len(lights) * AROUND) * before)
+    found = np.where(reached, plane_m * np.exp(best), 0).astype(np.float32)
     deep = plane_m.astype(np.float32) if few else np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
     on_plane = few or _on_plane(deep / plane_m, reached, _jumps(deep))
     unsure = _unsure(costs, len(lights), np.log(deep / plane_m), reached)
@@ -126,20 +135,27 @@ def _distances(
     )  # fmt: skip
 
 
+def _beforehand(found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the logarithm of how likely every ratio is before a point's own light is looked at, (ratio, 1, 1): a point
+    stands where most of those were ``found`` that are reached, (point,), logarithms, or anywhere: a wall behind the
+    subject may be as far as any part of it."""
+    near = np.exp(-0.5 * ((found - np.log(RATIOS)[:, None]) / RELIEF) ** 2).mean(axis=1)
+    return np.asarray(np.log(FOUND * near + (1 - FOUND) * RELIEF)[:, None, None])
+
+
 def _unsure(
     costs: NDArray[np.float64], lights: int, taken: NDArray[np.float64], reached: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
     """Return how far off the distance may be that was ``taken``, (row, col), logarithms both: the root mean square of
     how far others lie from it, by how much worse they explain the light.
 
-    Before its own light is looked at, a point stands where most of those that are ``reached`` were found, or anywhere:
-    a wall behind the subject may be as far as any part of it. What distances leave of the light is the surface's own,
-    and alike in neighbours: a square of points is one measurement per light and point of its width.
+    What distances leave of the light is the surface's own, and alike in neighbours: a square of points is one
+    measurement per light and point of its width.
     """
     logs = np.log(RATIOS)[:, None, None]
-    near = np.exp(-0.5 * ((taken[reached] - logs[:, 0]) / RELIEF) ** 2).mean(axis=1)
-    before = FOUND * near[:, None, None] + (1 - FOUND) * RELIEF
-    likely = before * np.exp(-0.5 * lights * AROUND * (costs - costs.min(axis=0)))
+    least = costs.min(axis=0)
+    told = 0.5 * lights * AROUND / max(float(np.median(least[reached])) / RIGHT, 1.0)
+    likely = np.exp(_beforehand(taken[reached]) - told * (costs - least))
     likely /= likely.sum(axis=0)
     return np.asarray(np.sqrt((likely * (logs - taken) ** 2).sum(axis=0) + SURE**2), np.float32)
 

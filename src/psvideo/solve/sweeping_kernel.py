@@ -11,6 +11,9 @@ from psvideo.model.irradiance.near_light import LEAST_COSINE
 ROUNDS = 4
 """Of weighing down what does not fit."""
 TINY = 1e-12
+FACES_AWAY = -0.2
+"""What is seen faces the camera: a normal whose cosine to it is below this belongs to no distance. Lamps that stand in
+a plane explain a surface behind it and its mirror image before it alike, whose normals face away."""
 
 
 class SweptLamps(NamedTuple):
@@ -63,7 +66,7 @@ def sweep_points(
             vectors /= mean  # what lamps send is in any unit, and TINY in none
             total = 0.0
             for _ in range(ROUNDS):
-                _left_over(light[point], vectors, weight, left)
+                _left_over(light[point], vectors, weight, rays[point], left)
                 total = 0.0
                 for k in range(lights):
                     if light[point, k] > 6 * noise:
@@ -74,8 +77,9 @@ def sweep_points(
 
 
 @FUSED.inlined
-def _left_over(light: Doubles, vectors: Doubles, weight: Doubles, left: Doubles) -> None:
-    """Fill ``left`` with what weighted least squares leaves of the light, by Cramer's rule."""
+def _left_over(light: Doubles, vectors: Doubles, weight: Doubles, ray: Doubles, left: Doubles) -> None:
+    """Fill ``left`` with what weighted least squares leaves of the light, by Cramer's rule: all of it where the normal
+    faces away along the ``ray`` from the camera."""
     xx = xy = xz = yy = yz = zz = a = b = c = 0.0
     for k in range(len(light)):
         w, x, y, z = weight[k], vectors[k, 0], vectors[k, 1], vectors[k, 2]
@@ -87,5 +91,9 @@ def _left_over(light: Doubles, vectors: Doubles, weight: Doubles, left: Doubles)
     gx = (one * a + two * b + three * c) / det
     gy = (two * a + (xx * zz - xz * xz) * b + (xy * xz - xx * yz) * c) / det
     gz = (three * a + (xy * xz - xx * yz) * b + (xx * yy - xy * xy) * c) / det
+    along = gx * ray[0] + gy * ray[1] + gz * ray[2]
+    squares = (gx * gx + gy * gy + gz * gz) * (ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+    if along > 0.0 and along * along > FACES_AWAY * FACES_AWAY * squares:
+        gx, gy, gz = 0.0, 0.0, 0.0
     for k in range(len(light)):
         left[k] = light[k] - (vectors[k, 0] * gx + vectors[k, 1] * gy + vectors[k, 2] * gz)

@@ -33,6 +33,9 @@ EVEN = 3
 EDGE_ODDS, MOST_ODDS = 4.0, np.float32(4)
 """What it says of the odds that one way is longer than the other: so much of their logarithm for light that changes
 wholly, and at most the second."""
+ON_PLANE = 0.1
+"""And so much that a point stands on the side that is nearer to the rig's plane: there the subject is. It decides where
+light tells nothing, and makes nothing surer."""
 CLOSE, STRANGE = np.float32(0.4), np.float32(0.8)
 """A way that is shorter than the first crosses no strong edge. A point all of whose ways are longer than the second
 more likely belongs to a surface of which nothing is known."""
@@ -59,7 +62,9 @@ def outlined(
     near_m, far_m = sides
     beside, between = far_m > APART * near_m, np.sqrt(near_m * far_m)
     nearer = _nearer(ground, lights, light, sides, beside, step=step, noise=noise)
-    depth_m = np.where(beside, np.where(nearer > 0, near_m, far_m), between).astype(np.float32)
+    plane = np.log(ground.depth_m[::step, ::step])
+    held = _held_by_plane(np.log(near_m) - plane, np.log(far_m) - plane)
+    depth_m = np.where(beside, np.where(nearer + held > 0, near_m, far_m), between).astype(np.float32)
     torn = np.where(beside, _torn(np.log(far_m / near_m), nearer), np.float32(0)).astype(np.float32)
     seeds = known & (~beside | (np.abs(nearer) > SURELY))
     if seeds.all() or not seeds.any():
@@ -72,11 +77,18 @@ def outlined(
     these |= (logs[first] - np.log(between)) * (logs[second] - np.log(between)) < 0
     gap = logs[second] - logs[first]
     odds = np.minimum(np.float32(EDGE_ODDS) * (ways[1] - ways[0]), MOST_ODDS) + np.sign(gap) * nearer
-    taken = np.where(seeds | ~these, places, np.where(odds >= 0, first, second))
+    held = _held_by_plane(logs[first] - plane, logs[second] - plane)
+    taken = np.where(seeds | ~these, places, np.where(odds + held >= 0, first, second))
     neither = unsure / (1 + np.exp(np.clip(np.float32(EDGE_ODDS) * (STRANGE - ways[0]), -40, 40)))
     across = np.where(these, np.maximum(_torn(gap, odds), neither), torn)
     torn = np.where(seeds, torn, across).astype(np.float32)
     return depth_m.ravel()[taken], unsure.ravel()[taken], torn
+
+
+def _held_by_plane(one: Floats, other: Floats) -> Floats:
+    """Return what the plane says of the odds that a point stands on ``one`` side and not on the ``other``, logarithms
+    of how far these are from it."""
+    return np.asarray(ON_PLANE * np.sign(np.abs(other) - np.abs(one)), np.float32)
 
 
 def _torn(gap: Floats, odds: Floats) -> Floats:

@@ -19,7 +19,7 @@ much as the best distance leaves. What is left is the rig's own error, alike in 
 make it surer."""
 LEAST_MISFIT = 0.1
 """Better than to this cost nothing is explained."""
-ON_PLANE, ANYWHERE = 0.05, 0.6
+ON_PLANE, ANYWHERE = 0.05, 0.7
 """Before its light is looked at, a part is thought to stand on the plane, to about the first share, for that was
 measured, or as likely elsewhere, within about the second."""
 SURE = 0.01
