@@ -124,6 +124,37 @@ def test_a_distance_may_be_off_by_how_far_others_lie_that_explain_the_light_too(
     )
 
 
+def test_of_two_surfaces_that_lamps_in_a_plane_explain_alike_the_one_that_faces_the_camera_is_taken() -> None:
+    """Lamps 0.33 m before a relief light its mirror image as much before them, 0.94 m from the lens, whose normals face
+    away: there it was put, and normals were 57 degrees off."""
+    rig = ring_rig(6, 1)
+    points, normals = surface(relief)
+    rng = np.random.default_rng(3)
+    plates = [plate + rng.normal(0, 0.0003, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    near = near_surface.near_surface_of(rig, rig.lights, height_px=SIZE, width_px=SIZE)
+    assert near is not None
+    off = np.abs(np.log(swept(near, rig.lights, plates).ground.depth_m / -points[..., 2]))
+    assert np.percentile(off, 98) < 0.02
+    found = ps.solve_images(np.stack(plates), rig)
+    assert np.degrees(np.linalg.norm(found.normals - normals, axis=-1)).mean() < 0.5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_light_hardly_tells_stands_where_most_of_the_picture_does_or_on_the_plane(seed: int) -> None:
+    """A disc on the plane, 13 % of the picture, before a wall a fifth farther away."""
+    v, u = np.mgrid[:SIZE, :SIZE].astype(float)
+    disc = np.hypot(u - SIZE / 2, v - SIZE / 2) < 20
+    deep, rng = np.where(disc, FAR_M, 1.4 * FAR_M), np.random.default_rng(seed)
+    points, rig = deep[..., None] * rays(u, v), ring_rig(5, 2)
+    plates = filmed(rig, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
+    noisy = [plate + rng.normal(0, 0.003, plate.shape).astype(np.float32) for plate in plates]
+    near = near_surface.near_surface_of(rig, rig.lights, height_px=SIZE, width_px=SIZE)
+    assert near is not None
+    off = np.abs(np.log(swept(near, rig.lights, noisy).ground.depth_m / deep))
+    assert off[disc].mean() < 0.03, "0.17, where the plane counts no more than any distance"
+    assert off[~disc].mean() < 0.1, "0.11 to 0.2, where each point is by itself"
+
+
 def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
     points, normals = surface(room)
     rig = ring_rig(8, 2)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from near_room import FAR_M, SIZE, Array, filmed, rays, ring_rig
 from numpy.typing import NDArray
 
@@ -62,6 +63,19 @@ def test_what_few_lights_reach_stands_on_the_only_surface_that_no_edge_parts_it_
 def test_what_a_pixel_shows_itself_counts_against_the_nearest_surface() -> None:
     depth_m, *_ = drawn(light_of(WALL_M), columns(LEFT, slice(56, SIZE)))
     assert np.mean(depth_m[:, STRIP] == np.float32(WALL_M)) > 0.7, "a half, by ways alone"
+
+
+@pytest.mark.parametrize("plane_m", [FAR_M, WALL_M])
+def test_where_light_tells_nothing_it_is_the_side_that_is_nearer_to_the_plane(plane_m: float) -> None:
+    ground, none = a_ground(ring_rig(5, 2, plane_m=plane_m)), columns()
+    sides = tuple(np.full((SIZE, SIZE), side, np.float32) for side in (FAR_M, WALL_M))
+    unsure = np.full((SIZE, SIZE), 0.02, np.float32)
+    dark = np.zeros((SIZE, SIZE, 5))
+    depth_m, _, torn = outlined(
+        ground, RIG.lights, dark, (sides[0], sides[1]), step=1, noise=NOISE, known=none, unsure=unsure
+    )
+    np.testing.assert_array_equal(depth_m, np.float32(plane_m))
+    np.testing.assert_allclose(torn, np.log(WALL_M / FAR_M) / 2, rtol=1e-5, err_msg="and that makes nothing surer")
 
 
 def test_what_is_reached_across_strong_edges_only_keeps_its_doubt() -> None:
