@@ -82,27 +82,44 @@ def test_depth_that_is_given_comes_before_falloff() -> None:
     )
 
 
+def a_little_off(rig: Rig, seed: int) -> Rig:
+    """Lamps that are 2 % weaker or stronger, and 3 mm beside."""
+    rng = np.random.default_rng(seed)
+    lights = (
+        replace(
+            light,
+            position_m=tuple(np.array(light.position_m) + rng.normal(0, 0.003 / np.sqrt(3), 3)),
+            intensity=(light.intensity[0] * (1 + 0.02 * rng.standard_normal()),),
+        )
+        for light in rig.lights
+    )
+    return replace(rig, lights=tuple(lights))
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_lamps_that_are_off_leave_a_subject_where_it_stands_and_a_wall_in_doubt(seed: int) -> None:
     """Lamps are 2 % weaker or stronger, and 3 mm beside where they are thought to be."""
     points, normals, ball = ball_before_wall()
-    rig, rng = ring_rig(8, 2), np.random.default_rng(seed)
-    true = replace(
-        rig,
-        lights=tuple(
-            replace(
-                light,
-                position_m=tuple(np.array(light.position_m) + rng.normal(0, 0.003 / np.sqrt(3), 3)),
-                intensity=(light.intensity[0] * (1 + 0.02 * rng.standard_normal()),),
-            )
-            for light in rig.lights
-        ),
-    )
-    found = solved(true, points, normals, thought=rig)
+    rig = ring_rig(8, 2)
+    found = solved(a_little_off(rig, seed), points, normals, thought=rig)
     depth, on_plane = ps.find_depth(found, rig), ps.find_depth(replace(found, distances=None), rig)
     assert abs(off_by(depth, points, ball)) < abs(off_by(on_plane, points, ball)) + 0.04
     largest = max(depth.placed, key=lambda part: part.share)
     assert abs(np.log1p(off_by(depth, points, ~ball))) < 2 * largest.unsure
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_lamps_that_are_off_put_elsewhere_is_not_trusted(seed: int) -> None:
+    """A ball was 11 degrees off, and half to three quarters of what was trusted by more than 10."""
+    points, normals, ball = ball_before_wall()
+    rig = ring_rig(8, 2)
+    found = solved(a_little_off(rig, seed), points, normals, thought=rig)
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    assert apart[ball].mean() < 4
+    assert found.valid[ball].mean() > 0.15
+    assert np.mean(apart[found.valid] > 10) < 0.03
+    assert found.error_deg is not None
+    assert np.mean(apart[ball] < 2 * found.error_deg[ball]) > 0.9
 
 
 def test_depth_rests_with_its_subject_and_follows_it() -> None:

@@ -20,10 +20,11 @@ from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.normals.trust.usual_errors import UsualErrors
-from psvideo.solve.sweeping import RATIOS, swept
 from psvideo.solve.sweeping import _averaged as averaged
 from psvideo.solve.sweeping import _costs as swept_costs
-from psvideo.solve.sweeping import _unsure as doubted
+from psvideo.solve.sweeping import swept
+from psvideo.solve.swept_odds import RATIOS
+from psvideo.solve.swept_odds import unsure_of as doubted
 
 
 def room(u: Array, v: Array) -> Array:
@@ -294,6 +295,8 @@ def test_where_a_shadow_ends_says_little_of_the_distance_around_it() -> None:
     light = np.stack(filmed(rig, points, np.broadcast_to([0.0, 0.0, 1.0], points.shape)), axis=-1).astype(np.float64)
     light[:, SIZE // 2, 0] /= 2
     ground = ground_of(rig, height_px=SIZE, width_px=SIZE)
-    costs = averaged(*swept_costs(ground, rig.lights, light, ground.depth_m.astype(np.float64), 1, noise=1e-4))
+    costs = averaged(
+        *swept_costs(ground, rig.lights, light, ground.depth_m.astype(np.float64), 1, noise=1e-4, own=0.005)
+    )
     beside, away = (costs[:, SIZE // 4, col].min() for col in (SIZE // 2 + 1, SIZE // 4))
     assert beside < away + 0.1

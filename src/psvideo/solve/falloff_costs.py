@@ -50,6 +50,7 @@ def around(light: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 def falloff_costs(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], depth_m: NDArray[np.float64],
     ratios: NDArray[np.float64], *, at: NDArray[np.bool_], step: int, noise: float, least_lit: int = LEAST_LIT,
+    own: float = OWN_SHARE,
 ) -> NDArray[np.float64]:  # fmt: skip
     """Return for the points of ``at``, row by row, how badly ``depth_m`` times each ratio explains their light.
 
@@ -68,7 +69,7 @@ def falloff_costs(
     lamps = SweptLamps(field.positions_m, field.axes, sent)
     costs = np.empty((len(ratios), int(at.sum())))
     fewest, noise = min(least_lit, len(lights)), max(noise, LEAST)
-    sweep_points(light[at], rays[at], depth_m[at], ratios, lamps, fewest, noise, OWN_SHARE, costs)
+    sweep_points(light[at], rays[at], depth_m[at], ratios, lamps, fewest, noise, own, costs)
     return costs
 
 

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from psvideo.model.irradiance.ground import Ground, spread
 from psvideo.model.rig import Light
 from psvideo.model.surface import Distances
-from psvideo.solve.falloff_costs import Plates, around, falloff_costs, light_at
+from psvideo.solve.falloff_costs import OWN_SHARE, Plates, around, falloff_costs, light_at
 from psvideo.solve.near_surface import NearSurface
 from psvideo.solve.normals.plate_noise import noise_of
 from psvideo.solve.pixels_of_points import for_pixels
+from psvideo.solve.swept_odds import AROUND, RATIOS, best_of, unsure_of
 from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
 
 LIGHTS_FOR_SWEEPING, LIGHTS_FOR_DOUBT = 5, 4
@@ -28,31 +29,17 @@ LIGHTS_FOR_SWEEPING, LIGHTS_FOR_DOUBT = 5, 4
 a part of the subject elsewhere. They say how unsure the plane's distance is, and no other one."""
 POINTS = 72
 """Points along the picture's longer side: distances are found for neighbourhoods."""
-RATIOS = np.geomspace(0.5, 2.5, 25)
-"""Of the plane's distance, 7 % apart; between them a parabola is laid."""
-AROUND = 5
-"""Costs are averaged over squares of this many points."""
 EDGE = 4.0
 """Where a shadow ends no distance explains the light of a point: its best cost, squared, counts so much against it."""
-STAY = 0.05
-"""The cost of standing off the plane by a factor e, squared; little beside what tells one distance from another."""
-LEAST_GAIN = 0.005
-"""A distance is taken where its cost is this much below the plane's: about a tenth of a standard error squared."""
 PLANE_HOLDS, LEAST_POINTS = 0.06, 25
 """A part of at least this many points is on the plane where it is found no farther from it than this share: the plane
 was measured, and normals say more of the relief than distances do."""
-FOUND, RELIEF = 0.8, 0.1
-"""The prior on distances: this share of the picture lies within about this share of distances that were found, the rest
-anywhere."""
-RIGHT = 0.5
-"""The best distance of the usual point costs so much, where lamps stand and shine as the rig says. What is left beyond
-that is the rig's own error, alike in all points: odds count in units of it."""
-PRIOR = 0.5
-"""The best distance is taken with so much of that prior's logarithm, in which the plane is as likely as any: several
-explain a point that four lights reach, or that lies at an edge, nearly alike. With all of it, what is dim is put where
-the most of the picture is."""
-SURE = 0.01
-"""Better than to this share no distance is known."""
+HARDLY = 0.15
+"""Where distances are more unsure than that, nothing says that all is on the plane."""
+RIGHT, OWN_SHARES = 0.1, OWN_SHARE * 2 ** (np.arange(8) / 2)
+"""Where lamps stand and shine as the rig says, the best distance of the usual point costs at most the first. Else light
+is taken to be off by as much of the second, shares of a point's brightest, as makes it so: lamps that are 2 % and 3 mm
+off put a subject elsewhere, and were sure of it."""
 JUMP = 0.08
 """Between neighbours of a point, depth that differs by more than this share is another part's."""
 
@@ -81,7 +68,15 @@ def swept(
     known = for_pixels(found.reached.view(np.uint8), each * fine, (rows, cols))[::fine, ::fine] > 0
     unsure = for_pixels(found.unsure, each * fine, (rows, cols))[::fine, ::fine]
     drawn, unsure, torn = outlined(
-        near.ground, lights, light, (closer, farther), step=fine, noise=dark, known=known, unsure=unsure
+        near.ground,
+        lights,
+        light,
+        (closer, farther),
+        step=fine,
+        noise=dark,
+        known=known,
+        unsure=unsure,
+        own=found.own,
     )
     ground = replace(near.ground, unsure=np.maximum(unsure, torn))
     depth_m = for_pixels(drawn, fine, (rows, cols))
@@ -99,13 +94,15 @@ def swept(
 @dataclass(frozen=True, kw_only=True)
 class SweptPoints:
     """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, which
-    of them enough lights ``reached``, and whether all of the surface stands on the plane; and of single points, how
+    of them enough lights ``reached``, whether all of the surface stands on the plane, and by which share of it light is
+    off beside noise, ``own``; and of single points, how
     badly distances explain them, ``costs`` (ratio, row, col), what that counts for, and the plane's distance."""
 
     depth_m: NDArray[np.float32]
     unsure: NDArray[np.float32]
     reached: NDArray[np.bool_]
     on_plane: bool
+    own: float
     costs: NDArray[np.float32]
     weight: NDArray[np.float32]
     plane_m: NDArray[np.float32]
@@ -117,47 +114,21 @@ def _distances(
     """Return the distances of every ``step``-th row and column from their light (row, col, light), those of the plane
     under ``few`` lights; None where too few reach anything."""
     plane_m = ground.depth_m[::step, ::step].astype(np.float64)
-    planes, sound = _costs(ground, lights, light, plane_m, step, noise=noise)
+    planes, sound, own = _explained(ground, lights, light, plane_m, step, noise=noise)
     costs, reached = _averaged(planes, sound), sound > 0
     if not reached.any():
         return None
-    before = np.maximum(_beforehand(_best(costs)[reached]), _beforehand(np.zeros(1)))  # or on the plane, surely
-    best = _best(costs - PRIOR * 2 / (len(lights) * AROUND) * before)
-    found = np.where(reached, plane_m * np.exp(best), 0).astype(np.float32)
+    found = np.where(reached, plane_m * np.exp(best_of(costs, len(lights), reached)), 0).astype(np.float32)
     deep = plane_m.astype(np.float32) if few else np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
-    on_plane = few or _on_plane(deep / plane_m, reached, _jumps(deep))
-    unsure = _unsure(costs, len(lights), np.log(deep / plane_m), reached)
+    unsure = unsure_of(costs, len(lights), np.log(deep / plane_m), reached)
     beside = cv2.dilate(unsure * reached, np.ones((AROUND, AROUND), np.uint8))
     unsure = np.where(reached, unsure, np.maximum(unsure, beside))  # in shadow it may be any surface around
+    told = bool(np.median(unsure[reached]) < HARDLY)
+    on_plane = few or (told and _on_plane(deep / plane_m, reached, _jumps(deep)))
     return SweptPoints(
         depth_m=deep, unsure=unsure, reached=reached, on_plane=on_plane,
-        costs=planes.astype(np.float32), weight=sound.astype(np.float32), plane_m=plane_m.astype(np.float32),
+        own=own, costs=planes.astype(np.float32), weight=sound.astype(np.float32), plane_m=plane_m.astype(np.float32),
     )  # fmt: skip
-
-
-def _beforehand(found: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the logarithm of how likely every ratio is before a point's own light is looked at, (ratio, 1, 1): a point
-    stands where most of those were ``found`` that are reached, (point,), logarithms, or anywhere: a wall behind the
-    subject may be as far as any part of it."""
-    near = np.exp(-0.5 * ((found - np.log(RATIOS)[:, None]) / RELIEF) ** 2).mean(axis=1)
-    return np.asarray(np.log(FOUND * near + (1 - FOUND) * RELIEF)[:, None, None])
-
-
-def _unsure(
-    costs: NDArray[np.float64], lights: int, taken: NDArray[np.float64], reached: NDArray[np.bool_]
-) -> NDArray[np.float32]:
-    """Return how far off the distance may be that was ``taken``, (row, col), logarithms both: the root mean square of
-    how far others lie from it, by how much worse they explain the light.
-
-    What distances leave of the light is the surface's own, and alike in neighbours: a square of points is one
-    measurement per light and point of its width.
-    """
-    logs = np.log(RATIOS)[:, None, None]
-    least = costs.min(axis=0)
-    told = 0.5 * lights * AROUND / max(float(np.median(least[reached])) / RIGHT, 1.0)
-    likely = np.exp(_beforehand(taken[reached]) - told * (costs - least))
-    likely /= likely.sum(axis=0)
-    return np.asarray(np.sqrt((likely * (logs - taken) ** 2).sum(axis=0) + SURE**2), np.float32)
 
 
 def _jumps(depth_m: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -173,14 +144,29 @@ def _on_plane(ratio: NDArray[np.float64], reached: NDArray[np.bool_], jumps: NDA
     return all(abs(float(np.log(np.median(part)))) < PLANE_HOLDS for part in known if len(part) >= LEAST_POINTS)
 
 
-def _costs(
+def _explained(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], plane_m: NDArray[np.float64], step: int, *,
     noise: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:  # fmt: skip
+    """Return how badly every distance explains the points' light, (ratio, row, col), how much that counts, and which
+    share of it light is off by beside noise: the least by which what is bright is explained."""
+    bright = OWN_SHARE * light.max(axis=-1) > noise
+    for own in OWN_SHARES.tolist():
+        planes, sound = _costs(ground, lights, light, plane_m, step, noise=noise, own=own)
+        least = _averaged(planes, sound).min(axis=0)[bright & (sound > 0)]
+        if not least.size or np.median(least) < RIGHT:
+            break
+    return planes, sound, own
+
+
+def _costs(
+    ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], plane_m: NDArray[np.float64], step: int, *,
+    noise: float, own: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
     """Return how badly every distance explains the points' light, (ratio, row, col), and how much that counts, 0 where
     too few lights reach a point."""
     every = np.ones(plane_m.shape, np.bool_)
-    costs = falloff_costs(ground, lights, light, plane_m, RATIOS, at=every, step=step, noise=noise)
+    costs = falloff_costs(ground, lights, light, plane_m, RATIOS, at=every, step=step, noise=noise, own=own)
     planes = costs.reshape(len(RATIOS), *plane_m.shape)
     sound: NDArray[np.float64] = (planes[0] > 0) / (1 + EDGE * planes.min(axis=0) ** 2)
     return planes, sound
@@ -191,16 +177,3 @@ def _averaged(planes: NDArray[np.float64], sound: NDArray[np.float64]) -> NDArra
     known = cv2.blur(sound, (AROUND, AROUND))
     each = [np.asarray(cv2.blur(plane * sound, (AROUND, AROUND))) for plane in planes]
     return np.stack(each) / np.maximum(known, 1e-9)
-
-
-def _best(costs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the logarithm of the best ratio of every point, 0 where the plane is as good."""
-    logs = np.log(RATIOS)
-    apart = logs[1] - logs[0]
-    held = costs + STAY * logs[:, None, None] ** 2 * apart
-    place = np.clip(np.argmin(held, axis=0), 1, len(RATIOS) - 2)[None]
-    before, here, after = (np.take_along_axis(held, place + shift, axis=0)[0] for shift in (-1, 0, 1))
-    bent = np.maximum(before - 2 * here + after, 1e-12)
-    found = logs[place[0]] + np.clip(0.5 * (before - after) / bent, -0.5, 0.5) * apart
-    plane = held[int(np.argmin(np.abs(logs)))]
-    return np.asarray(np.where(plane - here > LEAST_GAIN, found, 0))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.model.arrays import Floats, Mask
 from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
-from psvideo.solve.falloff_costs import falloff_costs
+from psvideo.solve.falloff_costs import OWN_SHARE, falloff_costs
 from psvideo.solve.nearest_surfaces import FAR, Places, nearest_surfaces
 
 FINE_POINTS = 960
@@ -49,7 +49,7 @@ def sides_of(deep: Floats) -> tuple[Floats, Floats]:
 
 def outlined(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], sides: tuple[Floats, Floats], *, step: int,
-    noise: float, known: Mask, unsure: Floats,
+    noise: float, known: Mask, unsure: Floats, own: float = OWN_SHARE,
 ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Return the depth (row, col) of every ``step``-th row and column, how unsure its logarithm is, and how far off it
     may be because points may belong to the other surface.
@@ -61,7 +61,7 @@ def outlined(
     """
     near_m, far_m = sides
     beside, between = far_m > APART * near_m, np.sqrt(near_m * far_m)
-    nearer = _nearer(ground, lights, light, sides, beside, step=step, noise=noise)
+    nearer = _nearer(ground, lights, light, sides, beside, step=step, noise=noise, own=own)
     plane = np.log(ground.depth_m[::step, ::step])
     held = _held_by_plane(np.log(near_m) - plane, np.log(far_m) - plane)
     depth_m = np.where(beside, np.where(nearer + held > 0, near_m, far_m), between).astype(np.float32)
@@ -98,7 +98,7 @@ def _torn(gap: Floats, odds: Floats) -> Floats:
 
 def _nearer(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], sides: tuple[Floats, Floats], beside: Mask, *,
-    step: int, noise: float,
+    step: int, noise: float, own: float,
 ) -> Floats:  # fmt: skip
     """Return the logarithm of the odds that a point is on the nearer side, were a disc of pixels one measurement per
     light and pixel of its width; 0 where sides are one, or too few lights reach a point."""
@@ -108,7 +108,16 @@ def _nearer(
     one = np.ones(1)
     near, far = (
         falloff_costs(
-            ground, lights, light, side.astype(np.float64), one, at=beside, step=step, noise=noise, least_lit=LEAST_LIT
+            ground,
+            lights,
+            light,
+            side.astype(np.float64),
+            one,
+            at=beside,
+            step=step,
+            noise=noise,
+            least_lit=LEAST_LIT,
+            own=own,
         )[0]
         for side in sides
     )

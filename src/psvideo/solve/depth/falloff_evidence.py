@@ -17,7 +17,7 @@ PER_MISFIT = 8.0
 """How much more likely one distance is than another: the logarithm of the odds, twice, for a cost that is larger by as
 much as the best distance leaves. What is left is the rig's own error, alike in all points, so that more of them do not
 make it surer."""
-LEAST_MISFIT = 0.1
+LEAST_MISFIT = 0.15
 """Better than to this cost nothing is explained."""
 ON_PLANE, ANYWHERE = 0.05, 0.7
 """Before its light is looked at, a part is thought to stand on the plane, to about the first share, for that was
