@@ -120,7 +120,7 @@ def _distances(
         return None
     found = np.where(reached, plane_m * np.exp(best_of(costs, len(lights), reached)), 0).astype(np.float32)
     deep = plane_m.astype(np.float32) if few else np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
-    unsure = unsure_of(costs, len(lights), np.log(deep / plane_m), reached)
+    unsure = unsure_of(costs, len(lights), np.log(deep / plane_m), reached, rig_is_off=own > OWN_SHARE)
     beside = cv2.dilate(unsure * reached, np.ones((AROUND, AROUND), np.uint8))
     unsure = np.where(reached, unsure, np.maximum(unsure, beside))  # in shadow it may be any surface around
     told = bool(np.median(unsure[reached]) < HARDLY)

@@ -14,6 +14,9 @@ LEAST_GAIN = 0.005
 FOUND, RELIEF = 0.8, 0.1
 """The prior on distances: this share of the picture lies within about this share of distances that were found, the rest
 anywhere."""
+DOUBTED = 0.5
+"""Where a rig is off, it is asked how unsure a distance is with this share instead: such lamps put the most of a
+picture elsewhere, all of it alike."""
 PRIOR = 0.5
 """The best distance is taken with so much of that prior's logarithm, in which the plane is as likely as any: several
 explain a point that four lights reach, or that lies at an edge, nearly alike. With all of it, what is dim is put where
@@ -25,17 +28,23 @@ SURE = 0.01
 def best_of(costs: NDArray[np.float64], lights: int, reached: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the logarithm of the best ratio of every point, by ``costs`` (ratio, row, col) of some lights: 0 where the
     plane is as good. A point is thought to stand where most of those do that are ``reached``, or on the plane."""
-    before = np.maximum(_beforehand(_least(costs)[reached]), _beforehand(np.zeros(1)))
+    before = np.maximum(_beforehand(_least(costs)[reached], FOUND), _beforehand(np.zeros(1), FOUND))
     return _least(costs - PRIOR / _told(lights) * before)
 
 
 def unsure_of(
-    costs: NDArray[np.float64], lights: int, taken: NDArray[np.float64], reached: NDArray[np.bool_]
+    costs: NDArray[np.float64],
+    lights: int,
+    taken: NDArray[np.float64],
+    reached: NDArray[np.bool_],
+    *,
+    rig_is_off: bool = False,
 ) -> NDArray[np.float32]:
     """Return how far off the distance may be that was ``taken``, (row, col), logarithms both: the root mean square of
     how far others lie from it, by how much worse they explain the light."""
     logs = np.log(RATIOS)[:, None, None]
-    likely = np.exp(_beforehand(taken[reached]) - _told(lights) * (costs - costs.min(axis=0)))
+    before = _beforehand(taken[reached], DOUBTED if rig_is_off else FOUND)
+    likely = np.exp(before - _told(lights) * (costs - costs.min(axis=0)))
     likely /= likely.sum(axis=0)
     return np.asarray(np.sqrt((likely * (logs - taken) ** 2).sum(axis=0) + SURE**2), np.float32)
 
@@ -46,12 +55,12 @@ def _told(lights: int) -> float:
     return 0.5 * lights * AROUND
 
 
-def _beforehand(found: NDArray[np.float64]) -> NDArray[np.float64]:
+def _beforehand(found: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     """Return the logarithm of how likely every ratio is before a point's own light is looked at, (ratio, 1, 1): a point
     stands where most of those were ``found`` that are reached, (point,), logarithms, or anywhere: a wall behind the
     subject may be as far as any part of it."""
     near = np.exp(-0.5 * ((found - np.log(RATIOS)[:, None]) / RELIEF) ** 2).mean(axis=1)
-    return np.asarray(np.log(FOUND * near + (1 - FOUND) * RELIEF)[:, None, None])
+    return np.asarray(np.log(share * near + (1 - share) * RELIEF)[:, None, None])
 
 
 def _least(costs: NDArray[np.float64]) -> NDArray[np.float64]:
