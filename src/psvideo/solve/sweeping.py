@@ -149,12 +149,13 @@ def _explained(
     noise: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:  # fmt: skip
     """Return how badly every distance explains the points' light, (ratio, row, col), how much that counts, and which
-    share of it light is off by beside noise: the least by which what is bright is explained."""
+    share of it light is off by beside noise: the least by which what is bright is explained. Of few points most lie at
+    edges, which no distance explains: these do not tell."""
     bright = OWN_SHARE * light.max(axis=-1) > noise
     for own in OWN_SHARES.tolist():
         planes, sound = _costs(ground, lights, light, plane_m, step, noise=noise, own=own)
         least = _averaged(planes, sound).min(axis=0)[bright & (sound > 0)]
-        if not least.size or np.median(least) < RIGHT:
+        if least.size < LEAST_POINTS or np.median(least) < RIGHT:
             break
     return planes, sound, own
 
