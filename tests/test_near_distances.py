@@ -125,6 +125,16 @@ def test_a_distance_may_be_off_by_how_far_others_lie_that_explain_the_light_too(
     )
 
 
+def test_where_a_rig_is_off_the_rest_of_the_picture_vouches_for_less_and_light_for_as_much() -> None:
+    logs, shape = np.log(RATIOS)[:, None, None], (6, 8)
+    found, reached, nothing_told = np.zeros(shape), np.ones(shape, np.bool_), np.zeros((len(RATIOS), *shape))
+    right, off = (doubted(nothing_told, 5, found, reached, rig_is_off=is_off) for is_off in (False, True))
+    np.testing.assert_array_less(1.4 * right, off)
+    told = 16 * logs**2 * np.ones(shape)
+    right, off = (doubted(told, 5, found, reached, rig_is_off=is_off) for is_off in (False, True))
+    np.testing.assert_allclose(off, right, rtol=0.1)
+
+
 def test_of_two_surfaces_that_lamps_in_a_plane_explain_alike_the_one_that_faces_the_camera_is_taken() -> None:
     """Lamps 0.33 m before a relief light its mirror image as much before them, 0.94 m from the lens, whose normals face
     away: there it was put, and normals were 57 degrees off."""
