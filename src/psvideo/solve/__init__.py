@@ -10,7 +10,6 @@
 
 Near lights: ``near_surface`` solves normals and depth in turns; ``sweeping`` finds the distance by the lights' falloff
 (with ``falloff_costs``, ``sweeping_kernel``, ``swept_odds``, ``swept_outlines``, ``nearest_surfaces`` and
-``pixels_of_points``). Over
-time: ``steady``, with ``steady_kernel`` and ``steady_votes``, keeps the trust in a pixel from flickering, and
-``at_rest`` says which rounds share their doubts.
+``pixels_of_points``). Over time: ``steady``, with ``steady_kernel`` and ``steady_votes``, keeps the trust in a pixel
+from flickering, and ``at_rest`` says which rounds share their doubts.
 """

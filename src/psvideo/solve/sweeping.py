@@ -38,8 +38,8 @@ HARDLY = 0.15
 """Where distances are more unsure than that, nothing says that all is on the plane."""
 RIGHT, OWN_SHARES = 0.1, OWN_SHARE * 2 ** (np.arange(8) / 2)
 """Where lamps stand and shine as the rig says, the best distance of the usual point costs at most the first. Else light
-is taken to be off by as much of the second, shares of a point's brightest, as makes it so: lamps that are 2 % and 3 mm
-off put a subject elsewhere, and were sure of it."""
+is taken to be off by the least of the second, as shares of a point's brightest, that makes it so: lamps that are 2 %
+and 3 mm off put a subject elsewhere, and were sure of it."""
 JUMP = 0.08
 """Between neighbours of a point, depth that differs by more than this share is another part's."""
 
@@ -95,8 +95,8 @@ def swept(
 class SweptPoints:
     """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, which
     of them enough lights ``reached``, whether all of the surface stands on the plane, and by which share of it light is
-    off beside noise, ``own``; and of single points, how
-    badly distances explain them, ``costs`` (ratio, row, col), what that counts for, and the plane's distance."""
+    off beside noise, ``own``; and of single points, how badly distances explain them, ``costs`` (ratio, row, col), what
+    that counts for, and the plane's distance."""
 
     depth_m: NDArray[np.float32]
     unsure: NDArray[np.float32]

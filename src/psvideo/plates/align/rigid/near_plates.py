@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 
 from psvideo.model.arrays import Doubles, Floats
-from psvideo.model.irradiance.near_light import LEAST_COSINE
 from psvideo.plates.align.plate_lamps import Lamps
 
 DOWN = np.array([1, -1, 1])
@@ -40,11 +39,8 @@ class NearPlates:
         metres = middle_m / far_px
         axis_px = [(place + 0.5) * scale - 0.5 for place in ground.principal_px]
         places = (near.positions_m + np.array([0, 0, middle_m])) * DOWN / metres
-        away = (near.positions_m - ground.middle_m) / metres
-        far = np.linalg.norm(away, axis=1)
-        cosine = np.maximum(-(away * near.axes).sum(axis=1) / far, LEAST_COSINE) ** near.anisotropy
-        sends = np.where(near.is_near, np.linalg.norm(matrix, axis=1) * far**2 / cosine, 0)
-        view = np.tile([*axis_px, 1 / far_px], (len(far), 1))
+        sends = np.where(near.is_near, np.linalg.norm(matrix, axis=1) / near.middle_gain / metres**2, 0)
+        view = np.tile([*axis_px, 1 / far_px], (len(sends), 1))
         lights = [sends[:, None], places, near.axes * DOWN, near.anisotropy[:, None], view]
         depth_m = cv2.resize(ground.depth_m, shape[::-1], interpolation=cv2.INTER_AREA)
         return cls(
