@@ -1,4 +1,4 @@
-"""Normals go on across narrow doubt in what moves, where both sides of it agree; and nowhere else."""
+"""Normals go on across narrow doubt and edges of paint in what moves, where both sides agree; and nowhere else."""
 
 from dataclasses import replace
 
@@ -101,6 +101,39 @@ def test_what_stands_still_stays_and_says_nothing_of_what_moves() -> None:
     still = np.zeros(SHAPE, np.bool_)
     assert continued(surface, still, limit_deg=LIMIT_DEG) is surface
     assert not strip_of(surface, still | (np.arange(SHAPE[1]) // 2 == 19 // 2))[0].any()
+
+
+def with_edge(normals: np.ndarray, strip_deg: float, *, beside: float = 0.3, claims_deg: float = 3.0) -> Surface:
+    """Return a surface that is trusted throughout, of another paint right of its middle, where a strip is turned."""
+    surface = with_strip(normals, strip_deg, claims_deg=claims_deg)
+    albedo = np.where(np.arange(SHAPE[1]) < 20, np.float32(0.7), np.float32(beside)) * np.ones(SHAPE, np.float32)
+    return replace(surface, albedo=albedo, valid=EVERYWHERE.copy())
+
+
+@pytest.mark.parametrize("strip_deg", [-15.0, 6.0, 25.0])
+def test_an_edge_of_paint_turns_no_normal_though_each_was_trusted(strip_deg: float) -> None:
+    """Plates that lie a part of a pixel beside each other show another share of either paint each."""
+    valid, angle, claims_deg = strip_of(with_edge(facing(0.0), strip_deg))
+    assert valid.all()
+    assert np.abs(angle).max() < 2
+    assert (np.abs(angle) < 2 * claims_deg).all()
+
+
+@pytest.mark.parametrize(("strip_deg", "beside"), [(15.0, 0.7), (15.0, 0.62), (60.0, 0.3), (2.0, 0.3)])
+def test_what_paint_does_not_explain_or_hardly_shows_stays_to_the_bit(strip_deg: float, beside: float) -> None:
+    surface = with_edge(facing(0.0), strip_deg, beside=beside)
+    before = surface.normals.copy()
+    told = continued(surface, EVERYWHERE, limit_deg=LIMIT_DEG)
+    assert (told.normals == before).all()
+    assert told.valid.all()
+
+
+def test_a_crease_between_two_paints_is_not_rounded() -> None:
+    faces = facing(np.where(np.arange(SHAPE[1]) < 20, -30.0, 30.0))
+    surface = with_edge(faces, 0.0)
+    surface.normals[:, STRIP] = faces[:, STRIP]
+    told = continued(surface, EVERYWHERE, limit_deg=LIMIT_DEG)
+    assert off_deg(told, faces).max() < 1
 
 
 def test_what_was_trusted_stays_to_the_bit() -> None:

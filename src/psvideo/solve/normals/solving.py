@@ -95,7 +95,7 @@ class Solving:
         one = replace(one, metal_deg=metal_deg)
         known, doubts = judged(solved, one, noise, before=before)
         if one.moved and one.moves is not None:
-            known = continued(known, one.moves, limit_deg=Judging().most_error_deg)
+            known = continued(known, one.moves, limit_deg=Judging().most_moving_error_deg)
         without = left_out(known, one, solved=solved.valid) if self.fill else None
         known = replace(
             known,

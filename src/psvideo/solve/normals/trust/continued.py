@@ -1,11 +1,13 @@
 """Where doubt is narrow, normals continue across it: at edges of paint plates lie a part of a pixel beside each other.
 
-A strip of a pixel or two, on whose both sides normals are trusted and agree, is no hole in the surface. Its normals are
-means of what was solved there and of a plane through those around, each counted by its error.
+A strip of a pixel or two, on whose both sides normals are trusted and agree, is no hole in the surface, and no crease
+either where it is an edge of paint. Its normals are means of what was solved there and of a plane through those around,
+each counted by its error.
 """
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,28 +26,38 @@ ALBEDO_MARGIN = 0.02
 FEWEST, MOST_UNCERTAIN = 0.2, 3.0
 """At least this share of the window must tell; and a plane's value is no more uncertain than so many times a mean's, as
 it is beside what tells."""
+PAINT_DEG, FARTHEST_DEG = 10.0, 25.0
+"""Where paint changes by a factor e to the next pixel, normals are off by so many degrees, and may well be by so many:
+plates that lie a part of a pixel beside each other show another share of either paint each."""
+LEAST_STEP, MOST_STEP = 0.2, 2.0
+"""Smaller steps of paint are noise, as logarithms, and larger ones edges of shadows."""
+DEPARTS_DEG = 2.5
+"""At an edge of paint that is asked only of what departs from the mean around by more: looking takes long."""
+OF_AROUND = 0.8
+"""So much of the errors around is common to them, and stays."""
 GAIN, AGREES = 0.8, 1.5
-"""What continues must be surer than this times the pixel's own error, which it may contradict by so many times."""
+"""What continues must be surer than this times the pixel's own error, and may contradict it by so many times what that
+may well be."""
 OF_APART = 0.4
-"""So much of what it contradicts the pixel's own normal by it may be off itself."""
-LEAST_DEG = 0.2
+"""So much of what it contradicts the pixel's own normal by, and paint does not explain, it may be off itself."""
+LEAST_DEG, LEAST_LEVEL = 0.2, 0.01
 AT_ONCE = 4096
 """Points that a thread takes together."""
 
 
 def continued(surface: Surface, moves: Mask, *, limit_deg: float) -> Surface:
-    """Return the surface with normals that are trusted on across narrow doubt in what ``moves``, a mask on a grid of
-    its own. What was trusted stays; ``limit_deg`` is the error up to which a normal is. The surface's memory is taken
-    over; one without errors passes as it is."""
+    """Return the surface with normals that are trusted on across narrow doubt and edges of paint in what ``moves``, a
+    mask on a grid of its own. Beside these, what was trusted stays; ``limit_deg`` is the error up to which a normal is.
+    The surface's memory is taken over; one without errors passes as it is."""
     error = surface.error_deg
     if error is None:
         return surface
     there = at_points(moves, error.shape)
-    asked = there & ~surface.valid & (error > 0)
-    if not asked.any() or not (surface.valid & there).any():
+    solved, sure = there & (error > 0), surface.valid & there
+    if not sure.any():
         return surface
     stride = max(round(error.shape[1] / moves.shape[1] / FINEST), 1)
-    part = _Part.around(asked, (surface, error), surface.valid & there, stride)
+    part = _Part.around(solved, (surface, error), sure, stride)
     normal, error_deg, takes = part.looked_at(limit_deg)
     rows, cols = (part.places[takes] + np.array(part.corner, np.uint32)).T
     surface.normals[rows, cols] = normal[takes].astype(surface.normals.dtype)
@@ -58,29 +70,36 @@ def continued(surface: Surface, moves: Mask, *, limit_deg: float) -> Surface:
 @dataclass(frozen=True, kw_only=True)
 class _Part:
     """What lies around the pixels that are asked: their ``places`` (point, 2) from its ``corner`` on; ``normals`` (3,
-    row, col), the mean albedo, ``level``, and ``error`` in degrees, (row, col); and what is ``sure``, of which every
-    ``stride``-th pixel in rows and columns is looked at."""
+    row, col), the mean albedo, ``level``, by how much that changes, ``step``, and ``error`` in degrees, (row, col); and
+    what is ``sure``, of which every ``stride``-th pixel in rows and columns is looked at."""
 
     places: Indices
     corner: tuple[int, int]
     normals: Floats
     level: Floats
+    step: Floats
     error: Floats
     sure: Mask
     stride: int
 
     @classmethod
-    def around(cls, asked: Mask, given: tuple[Surface, NDArray[np.floating]], sure: Mask, stride: int) -> "_Part":
-        """Return what lies around what is ``asked`` (row, col) of a surface, which is ``given`` with its errors."""
+    def around(cls, solved: Mask, given: tuple[Surface, NDArray[np.floating]], sure: Mask, stride: int) -> "_Part":
+        """Return what lies around what moves of a surface, which is ``given`` with its errors, and is ``solved`` (row,
+        col): asked is what is not ``sure`` of that, and what lies at an edge of paint."""
         (surface, error), reach = given, REACH_PX * stride
-        spans = [np.flatnonzero(asked.any(axis=axis)) for axis in (1, 0)]
+        spans = [np.flatnonzero(solved.any(axis=axis)) for axis in (1, 0)]
         part = tuple(slice(max(int(span[0]) - reach, 0), int(span[-1]) + reach + 1) for span in spans)
         albedo = surface.albedo[part].astype(np.float32)
+        level = np.ascontiguousarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1))
+        normals = np.ascontiguousarray(np.moveaxis(surface.normals[part], -1, 0), np.float32)
+        step = _paint_step(level, error[part] > 0, stride)
+        at_edge = (step > 0) & _departs(normals, sure[part], 2 * reach + 1)
         return cls(
-            places=np.argwhere(asked[part]).astype(np.uint32),
+            places=np.argwhere(solved[part] & (~sure[part] | at_edge)).astype(np.uint32),
             corner=(part[0].start, part[1].start),
-            normals=np.ascontiguousarray(np.moveaxis(surface.normals[part], -1, 0), np.float32),
-            level=np.ascontiguousarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1)),
+            normals=normals,
+            level=level,
+            step=step,
             error=np.ascontiguousarray(error[part], np.float32),
             sure=np.ascontiguousarray(sure[part]),
             stride=stride,
@@ -89,6 +108,23 @@ class _Part:
     def looked_at(self, limit_deg: float) -> tuple[Doubles, Doubles, Mask]:
         """Return the points' normals (point, 3) and errors in degrees with what continues from around, and which of
         them are sure enough."""
+        found = self._found()
+        rows, cols = self.places.T
+        own = self.normals[:, rows, cols].T.astype(np.float64)
+        claimed_deg, steps = (plane[rows, cols].astype(np.float64) for plane in (self.error, self.step))
+        onward, uncertain, share = found[:, :3], found[:, 4], found[:, 5]
+        apart = np.degrees(np.arccos(np.clip((own * onward).sum(axis=1), -1, 1)))
+        own_deg, most_deg = (np.hypot(claimed_deg, each * steps) for each in (PAINT_DEG, FARTHEST_DEG))
+        unexplained = OF_APART * apart * np.square(claimed_deg / own_deg)
+        error_deg = np.hypot(OF_AROUND * found[:, 3], unexplained)
+        takes = (share > FEWEST) & (uncertain < MOST_UNCERTAIN) & (error_deg <= limit_deg)
+        takes &= (error_deg < GAIN * own_deg) & (apart < AGREES * most_deg)
+        counts = [1 / np.square(np.maximum(each, LEAST_DEG))[:, None] for each in (own_deg, error_deg)]
+        mean = counts[0] * own + counts[1] * onward
+        return mean / np.linalg.norm(mean, axis=1, keepdims=True), error_deg, takes
+
+    def _found(self) -> Doubles:
+        """Return what ``continue_points`` finds of all places."""
         from psvideo.solve.normals.trust.continued_kernel import AroundPoint, continue_points
 
         around = AroundPoint(
@@ -106,16 +142,25 @@ class _Part:
             continue_points(self.places, around, found, first, last)
 
         over_ranges(look, len(self.places), each=AT_ONCE)
-        rows, cols = self.places.T
-        own, own_deg = self.normals[:, rows, cols].T.astype(np.float64), self.error[rows, cols].astype(np.float64)
-        onward, continues_deg, uncertain, share = found[:, :3], found[:, 3], found[:, 4], found[:, 5]
-        apart = np.degrees(np.arccos(np.clip((own * onward).sum(axis=1), -1, 1)))
-        error_deg = np.hypot(continues_deg, OF_APART * apart)
-        takes = (share > FEWEST) & (uncertain < MOST_UNCERTAIN) & (error_deg <= limit_deg)
-        takes &= (error_deg < GAIN * own_deg) & (apart < AGREES * own_deg)
-        counts = [1 / np.square(np.maximum(each, LEAST_DEG))[:, None] for each in (own_deg, error_deg)]
-        mean = counts[0] * own + counts[1] * onward
-        return mean / np.linalg.norm(mean, axis=1, keepdims=True), error_deg, takes
+        return found
+
+
+def _paint_step(level: Floats, known: Mask, stride: int) -> Floats:
+    """Return by which factor paint changes around every pixel at most, as a logarithm (row, col), 0 where it does not;
+    of what is ``known`` of its ``level``."""
+    square = np.ones((2 * stride + 1,) * 2, np.uint8)
+    least = cv2.erode(np.where(known, level, np.float32(np.inf)), square)
+    most = cv2.dilate(np.where(known, level, np.float32(0)), square)
+    step = np.log(np.maximum(most, LEAST_LEVEL) / np.maximum(np.minimum(least, most), LEAST_LEVEL))
+    return np.asarray(np.where(step > LEAST_STEP, np.minimum(step, MOST_STEP), 0), np.float32)
+
+
+def _departs(normals: Floats, sure: Mask, window_px: int) -> Mask:
+    """Return where normals (3, row, col) depart from the mean of what is sure around."""
+    means = [cv2.blur(plane * sure, (window_px, window_px)) for plane in normals]
+    along = sum((one * mean for one, mean in zip(normals, means, strict=True)), np.float32(0))
+    length = np.sqrt(sum((mean * mean for mean in means), np.float32(0)))
+    return np.asarray(along < np.float32(np.cos(np.radians(DEPARTS_DEG))) * length)
 
 
 def _nearness() -> Doubles:
