@@ -1,7 +1,7 @@
 """Rounds of plates of scenes that move in known ways, rendered without a camera, and what alignment makes of them."""
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,8 @@ class Filmed:
     rounds: Plates
     lit: Illumination
     stage: Stage
+    truths: dict[float, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    """True normals and where the subject is, by time: tests ask for both, and before and after alignment."""
 
     @property
     def lights(self) -> tuple[str, ...]:
@@ -59,15 +61,22 @@ class Filmed:
 
     def error_deg(self, surface: Surface, time_s: float) -> tuple[float, float]:
         """Return the mean error over the subject, and which share of it is valid."""
-        subject = self.subject(time_s)
+        normals, subject = self.truth(time_s)
         said = surface.valid & subject
-        off_deg = angles_deg(surface.normals, true_normals(self.stage.view(time_s).hits))
+        off_deg = angles_deg(surface.normals, normals)
         return float(off_deg[said].mean()), float(said.sum() / subject.sum())
 
     def subject(self, time_s: float) -> np.ndarray:
         """Return where the subject is."""
-        hits = self.stage.view(time_s).hits
-        return hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
+        return self.truth(time_s)[1]
+
+    def truth(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the true normals, and where the subject is."""
+        if time_s not in self.truths:
+            hits = self.stage.view(time_s).hits
+            subject = hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
+            self.truths[time_s] = true_normals(hits), subject
+        return self.truths[time_s]
 
     def solved(self, one: Round) -> Surface:
         return solve(LitPlates([plate.image for plate in one.plates], self.lit, seen=seen(one)))
