@@ -75,11 +75,20 @@ def pin_levels_where(trace: Trace, name: str, cycles: np.ndarray) -> np.ndarray:
     return np.searchsorted(trace.edges.get(name, np.zeros(0)), cycles, side="right") % 2
 
 
-@pytest.mark.parametrize("load", ["poll {ms} CLK a1", "flood {ms} STAT"])
+POLL, FLOOD = "poll {ms} CLK a1", "flood {ms} STAT"
+PLAYED: list[tuple[AvrBoard, WiringName, list[Slot]]] = [
+    *((board, "gated", plan) for board in BOTH for plan in (ROUND, BURSTS)),
+    ("atmega328p", "direct", POWERS),
+    ("atmega2560", "direct", POWERS),
+    ("atmega2560", "direct", THREE),
+]
+
+
 @pytest.mark.parametrize(
-    ("board", "wiring", "slots"),
-    [(board, "gated", plan) for board in BOTH for plan in (ROUND, BURSTS)]
-    + [("atmega328p", "direct", POWERS), ("atmega2560", "direct", POWERS), ("atmega2560", "direct", THREE)],
+    ("board", "wiring", "slots", "load"),
+    [(*case, FLOOD) for case in PLAYED]
+    + [(*PLAYED[1], POLL)]
+    + [pytest.param(*case, POLL, marks=pytest.mark.campaign) for case in (PLAYED[0], *PLAYED[2:])],
 )
 def test_every_edge_is_where_it_belongs(
     emulate: Callable[..., list[str]],
@@ -160,7 +169,7 @@ def random_slot(dice: random.Random, number: int, caps: Capabilities) -> Slot:
             return made
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(4, 12))])
 def test_any_cycle_that_is_taken_is_played_to_the_tick(
     emulate: Callable[..., list[str]], upload: Callable[..., list[str]], tmp_path: Path, seed: int
 ) -> None:
