@@ -214,6 +214,11 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 SLOW = {"how_frames", "how_plates", "how_normals", "gallery_depth", "depth_bust", "rolling_fan"}
 SLOW |= {
+    "fault_clipped",
+    "fault_half_shutter",
+    "fault_misnamed_rate",
+    "fault_short_dark_time",
+    "fault_swapped_lights",
     "fault_banding",
     "fault_colour_shift",
     "fault_dropped_frame",
