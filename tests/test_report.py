@@ -26,7 +26,7 @@ direction = [-0.3, -0.6, 0.8]
 mesh = "sphere"
 """
 PAINT = 'albedo = { pattern = "noise", colour = [0.8, 0.7, 0.6], second = [0.4, 0.45, 0.5], size_m = 0.15 }'
-THREE_LIGHTS = SPHERE.replace("frames = 12", "frames = 30").replace(
+THREE_LIGHTS = SPHERE.replace("frames = 12", "frames = 21").replace(
     "readout_s = 0.01\n", "readout_s = 0.01\nfull_well_e = 20000.0\nread_e = 5.0\n"
 )
 FIVE_LIGHTS = THREE_LIGHTS.replace('\n[[object]]\nmesh = "sphere"\n', FIVE).replace("albedo = 0.8", PAINT)
@@ -55,7 +55,7 @@ SCENES = {
     "sun": FIVE_LIGHTS + "\n[ambient]\nlevel = 0.7\n",
     "spinning": FIVE_LIGHTS + "motion = { spin_deg_per_s = 200.0, axis = [0.0, 1.0, 0.0] }\n",
     "passing": FIVE_LIGHTS + "motion = { velocity_m_per_s = [1.2, 0.0, 0.0] }\n",
-    "dropped": FIVE_LIGHTS + "\n[output]\ndropped = [9, 10]\n",
+    "dropped": FIVE_LIGHTS.replace("frames = 21", "frames = 30") + "\n[output]\ndropped = [9, 10]\n",
     "cut": FIVE_LIGHTS.replace("flash_s = 0.001", "flash_s = 0.001\ndark_s = 0.007"),
     "half_open": FIVE_LIGHTS.replace("shutter_deg = 360.0", "shutter_deg = 180.0"),
     "noisy": all_strengths(FIVE_LIGHTS, 0.15).replace("full_well_e = 20000.0", "full_well_e = 1500.0"),
@@ -81,7 +81,7 @@ def reported(shot: Callable[[str], Path], tmp_path_factory: pytest.TempPathFacto
     def report(name: str) -> dict[str, Any]:
         if not (folder / name).is_dir():
             clip = shot(name)
-            assert run("normals", clip, "--rig", clip / "rig.toml", "-o", folder / name, "-q") == 0
+            assert run("normals", clip, "--rig", clip / "rig.toml", "-o", folder / name, "--no-preview", "-q") == 0
         found: dict[str, Any] = json.loads((folder / name / "report.json").read_text())
         return found
 
@@ -111,14 +111,14 @@ def test_a_good_take_is_called_usable_and_every_line_good(reported: Callable[...
         ("weak", "usable, with reservations", "lights", r"'left' is weak: [67] %"),
         ("dead", "doubtful: see below", "lights", r"'left' gives no light"),
         ("ambient", "usable, with reservations", "ambient", r"3\d % of the signal.*Cover windows"),
-        ("sun", "not usable as it is: ambient", "ambient", r"5\d % of the signal"),
+        pytest.param("sun", "not usable as it is: ambient", "ambient", r"5\d % of the signal", marks=pytest.mark.campaign),
         ("spinning", "usable, with reservations", "motion", r"picture moves, by up to 1\.\d px from flash to flash"),
-        ("passing", "usable, with reservations", "motion", r"by up to 1\.[34] px from flash to flash"),
+        pytest.param("passing", "usable, with reservations", "motion", r"by up to 1\.[34] px from flash to flash", marks=pytest.mark.campaign),
         ("dropped", "usable, with reservations", "frames", r"2 frames are missing \(2 after number 9\)"),
         ("cut", "not usable as it is: rows", "rows", r"dark time of 7 ms is shorter.*plates are cut.*at least 10 ms"),
         ("half_open", "usable, with reservations", "rows", r"180 degrees only.*other rounds.*Shoot at 360 degrees"),
         ("noisy", "usable, with reservations", "validity", r"reach [89]\d %.*error is too large. Give more light"),
-        ("noisier", "not usable as it is: validity", "validity", r"reach 8\d %.* (9|1[0-2]) % of .*Give more light"),
+        pytest.param("noisier", "not usable as it is: validity", "validity", r"reach 8\d %.* (9|1[0-2]) % of .*Give more light", marks=pytest.mark.campaign),
     ],
 )  # fmt: skip
 def test_the_first_lines_say_what_spoils_a_take_and_what_to_change(
