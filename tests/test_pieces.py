@@ -111,9 +111,9 @@ def test_rounds_share_what_their_subject_reflects_and_pieces_take_over_what_the_
     assert judged(tmp_path / "pieces") == judged(tmp_path / "whole")
 
 
-def test_what_comes_in_late_is_looked_at_too(glossy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_comes_in_late_is_looked_at_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spread, "EACH", 2)
-    take = ps.open_take(glossy)
+    take = ps.open_take(filmed(tmp_path, frames=46, speed_px=0.3))
     timing = ps.find_timing(take)
     every = {one.number: one for one in gather(take, timing, aligning=Aligning())}
     read: list[int] = []
