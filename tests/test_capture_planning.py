@@ -38,11 +38,14 @@ ANY_REQUEST = st.builds(
 )
 
 
-@given(ANY_REQUEST)
-@settings(max_examples=150, deadline=None)
-def test_a_plan_is_the_same_when_it_is_read_back(request_words: ShootWords) -> None:
+def stays_when_read_back(request_words: ShootWords) -> None:
     plan = plan_shoot(parse_request(request_words)).plan
     assert parse_plan(format_plan(plan)) == plan
+
+
+@pytest.mark.parametrize("examples", [40, pytest.param(150, marks=pytest.mark.campaign)])
+def test_a_plan_is_the_same_when_it_is_read_back(examples: int) -> None:
+    settings(max_examples=examples, deadline=None)(given(ANY_REQUEST)(stays_when_read_back))()
 
 
 @given(ANY_REQUEST)
