@@ -49,7 +49,12 @@ def test_a_rig_gets_a_name_under_which_it_can_be_read(
     ("circle", "status", "says"),
     [
         ("95.3,71.8,63", 0, "lies 3 pixels from the outline that the pictures show, 95,72,60"),
-        ("101,71.8,60", 0, "lies 6 pixels from the outline that the pictures show, 95,72,60"),
+        pytest.param(
+            "101,71.8,60",
+            0,
+            "lies 6 pixels from the outline that the pictures show, 95,72,60",
+            marks=pytest.mark.campaign,
+        ),
         ("110,71.8,60", 1, "lies 15 pixels from the outline that the pictures show, 95,72,60"),
     ],
 )

@@ -4,7 +4,7 @@ The pictures are made here, of microfacets (B. Walter et al., EGSR 2007, G. Ward
 K. Torrance's of 1982), which the lobes that are fitted are not.
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -94,11 +94,11 @@ def found_in(plates: Array, lights: Array) -> Metal | None:
     return None if look is None else metal_of([look])
 
 
-METALS: list[tuple[tuple[float, float, float], Kind, Array, float]] = [
+METALS: list[Any] = [
     (BRONZE, "microfacets", EIGHT, 3.5),
-    (BRONZE, "microfacets", TWELVE, 3.5),
-    (BRONZE, "ward", TWELVE, 3.5),
-    (BRONZE, "beckmann", TWELVE, 3.5),
+    pytest.param(BRONZE, "microfacets", TWELVE, 3.5, marks=pytest.mark.campaign),
+    pytest.param(BRONZE, "ward", TWELVE, 3.5, marks=pytest.mark.campaign),
+    pytest.param(BRONZE, "beckmann", TWELVE, 3.5, marks=pytest.mark.campaign),
     (STEEL, "ward", TWELVE, 3.5),
 ]
 
@@ -119,7 +119,7 @@ def test_metal_is_solved_by_its_highlights(
     assert (off[as_metal.valid] > 10).mean() < 0.03
 
 
-@pytest.mark.parametrize("kind", ["microfacets", "ward"])
+@pytest.mark.parametrize("kind", ["microfacets", pytest.param("ward", marks=pytest.mark.campaign)])
 def test_albedo_of_metal_is_that_of_what_faces_the_camera(kind: Kind) -> None:
     """What leans is dark under lamps that it does not mirror, and no darker metal for that."""
     truth = bumps()

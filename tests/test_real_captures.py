@@ -36,7 +36,7 @@ def errors_deg(found: np.ndarray, true: np.ndarray) -> np.ndarray:
     return angles
 
 
-@pytest.mark.parametrize("thing", ["cat", "horse", "gray"])
+@pytest.mark.parametrize("thing", ["cat", pytest.param("horse", marks=pytest.mark.campaign), "gray"])
 def test_the_photographs_of_the_university_of_washington_are_solved(
     thing: str, shared_data: Path, tmp_path: Path
 ) -> None:

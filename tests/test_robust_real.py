@@ -132,7 +132,7 @@ def things(shared_data: Path) -> list[Case]:
     return [photographed("bear"), photographed("cat"), diligent_ball(), washington_sphere(), rendered_bunny()]
 
 
-@pytest.mark.parametrize("count", [3, 4])
+@pytest.mark.parametrize("count", [3, pytest.param(4, marks=pytest.mark.campaign)])
 def test_over_real_objects_errors_under_few_lights_are_claimed_right_to_a_factor_of_one_and_a_half(
     things: list[Case], count: int
 ) -> None:
