@@ -182,7 +182,7 @@ def by_one_thread(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Calla
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.campaign) if name in ("split", "depth") else name for name in COMMANDS],
+    [name if name == "sync" else pytest.param(name, marks=pytest.mark.campaign) for name in COMMANDS],
 )
 def test_any_number_of_threads_gives_the_same_bytes_also_under_load(
     name: str, clip: Path, tmp_path: Path, by_one_thread: Callable[[str], Digest]
