@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pytest
 
 from psvideo.clip import Masks
 from psvideo.model.camera import Camera
@@ -30,6 +31,8 @@ from psvideo.solve.normals.solving import Solving
 
 SIZE = 96
 SEEDS = (0, 1, 2)
+ONE_QUICKLY = [seed if seed == 0 else pytest.param(seed, marks=pytest.mark.campaign) for seed in SEEDS]
+"""One seed in the suite, the others in the campaigns."""
 
 
 @dataclass(frozen=True, kw_only=True)
