@@ -232,7 +232,10 @@ def is_lost_and_found_again(plan: Plan, again: TrueClock, *, missing: int) -> No
     assert np.abs(apart_rows(whole, np.array(true_s), plan)).max() < LIVE_ROWS
 
 
-@pytest.mark.parametrize(("missing", "rows"), [(18, 0.6), (8, -0.2), (16, 0.4)])
+@pytest.mark.parametrize(
+    ("missing", "rows"),
+    [(8, -0.2), *(pytest.param(*case, marks=pytest.mark.campaign) for case in ((18, 0.6), (16, 0.4)))],
+)
 def test_a_strobe_that_was_started_again_where_missing_frames_nearly_explain_it_is_lost_and_found_again(
     make_plan: PlanMaker, missing: int, rows: float
 ) -> None:
@@ -259,7 +262,7 @@ def test_a_strobe_that_was_started_again_is_not_the_one_from_before_though_its_f
     is_lost_and_found_again(plan, clock, missing=missing)
 
 
-@pytest.mark.parametrize("covered", [30, 60, 200])
+@pytest.mark.parametrize("covered", [30, pytest.param(60, marks=pytest.mark.campaign), 200])
 def test_a_lens_that_is_covered_for_a_while_is_looked_through_again_with_one_lock(
     make_plan: PlanMaker, covered: int
 ) -> None:

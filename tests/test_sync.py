@@ -130,7 +130,7 @@ def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_da
     assert timing.order == "marker"
 
 
-@pytest.mark.parametrize("ambient", [0.0, 0.1])
+@pytest.mark.parametrize("ambient", [pytest.param(0.0, marks=pytest.mark.campaign), 0.1])
 def test_the_dark_slot_names_the_lights_where_no_row_opens_or_closes_during_a_flash(
     ambient: float, make_plan: PlanMaker
 ) -> None:

@@ -68,7 +68,12 @@ def with_camera(plan: Plan, **changes: object) -> Plan:
 
 
 @pytest.mark.parametrize(
-    ("true", "planned"), [pytest.param(0.5, 1.0, marks=pytest.mark.campaign), (1.0, 0.5), (0.25, 0.5)]
+    ("true", "planned"),
+    [
+        pytest.param(0.5, 1.0, marks=pytest.mark.campaign),
+        (1.0, 0.5),
+        pytest.param(0.25, 0.5, marks=pytest.mark.campaign),
+    ],
 )
 def test_a_shutter_wrong_by_a_factor_is_found_and_named(true: float, planned: float, plan: Plan) -> None:
     period_s = plan.camera.frame_period_s
@@ -599,7 +604,7 @@ def test_a_subject_whose_bright_rows_grow_brighter_is_not_taken_for_a_camera_who
     assert timing_of(plan, shot.frames.mean(axis=2, dtype=np.float64)).swing is None
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (2, 3))])
 def test_slow_changes_of_a_camera_s_gain_are_not_blamed_on_lamps_alone(plan: Plan, seed: int) -> None:
     """Between two frames whose gains hardly differ a flash's own explains as much; and no gain was given to frames that
     see hardly any light, so that those of flashes left less over."""
@@ -669,7 +674,7 @@ def test_light_of_the_room_that_grows_is_no_gain_of_the_camera(plan: Plan, room:
     assert not any("gain by itself" in note for note in timing_of(plan, profiles).notes)
 
 
-@pytest.mark.parametrize("ppm", [0.0, 30.0])
+@pytest.mark.parametrize("ppm", [0.0, pytest.param(30.0, marks=pytest.mark.campaign)])
 def test_pictures_that_any_flash_times_explain_are_refused(plan: Plan, ppm: float) -> None:
     """A flash a frame: rows see four pictures, of three lights and the room."""
     period_s = plan.camera.frame_period_s
@@ -753,7 +758,7 @@ def locked(plan: Plan, shutter: float) -> Plan:
     return replace(film, dark_s=period_s - plan.flashes[0].duration_s)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.4, 0.7])
+@pytest.mark.parametrize("share", [0.1, *(pytest.param(share, marks=pytest.mark.campaign) for share in (0.4, 0.7))])
 def test_flashes_that_no_exposure_cuts_are_known_to_an_interval_only(share: float, plan: Plan) -> None:
     film = locked(plan, 0.9)
     phase_s = share * film.camera.frame_period_s
@@ -899,7 +904,7 @@ def two_windows(make_plan: PlanMaker) -> tuple[Plan, Profiles]:
     return plan, rows.binned(8)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.campaign)])
 def test_a_clock_that_moving_rows_feign_is_not_believed_where_no_row_splits_a_flash(
     make_plan: PlanMaker, seed: int
 ) -> None:

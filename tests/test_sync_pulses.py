@@ -39,7 +39,7 @@ def test_a_rise_and_a_fall_that_are_alike_are_found_though_no_flash_seems_longer
     assert [timing.rise_s, timing.fall_s] == pytest.approx([2e-5, 2e-5], rel=0.1)
 
 
-@pytest.mark.parametrize("tail_rows", [0.0, 0.1, 0.2])
+@pytest.mark.parametrize("tail_rows", [0.0, 0.1, pytest.param(0.2, marks=pytest.mark.campaign)])
 def test_tails_of_a_part_of_a_row_are_found_or_claimed_where_nothing_moves(
     tail_rows: float, make_plan: PlanMaker
 ) -> None:
@@ -65,7 +65,7 @@ def test_tails_far_shorter_than_the_time_from_row_to_row_are_found(
     assert rms_rows(timing, shot, plan) < 3 * timing.phase_error_rows < 0.02
 
 
-@pytest.mark.parametrize("share", [0.01, 0.03])
+@pytest.mark.parametrize("share", [0.01, pytest.param(0.03, marks=pytest.mark.campaign)])
 def test_a_blur_between_rows_that_are_far_apart_in_time_is_not_taken_for_tails(
     share: float, make_plan: PlanMaker
 ) -> None:

@@ -118,7 +118,10 @@ def test_a_clip_of_every_second_frame_is_found_and_said(plan: Plan) -> None:
     assert any("fps in the plan is 2 times too high" in note for note in timing.notes)
 
 
-@pytest.mark.parametrize(("step", "recoded"), [("2", 0.0), ("5/2", 0.0), ("6/5", 0.0), ("2/5", 0.015)])
+@pytest.mark.parametrize(
+    ("step", "recoded"),
+    [("2", 0.0), pytest.param("5/2", 0.0, marks=pytest.mark.campaign), ("6/5", 0.0), ("2/5", 0.015)],
+)
 def test_what_a_rule_leaves_out_or_repeats_breaks_no_take_off(step: str, recoded: float, plan: Plan) -> None:
     """Beside a frame that is missing by chance a strobe may have stopped; where all do by one rule, it did not."""
     timing = retimed(plan, pattern(step), recoded=recoded)
@@ -192,7 +195,7 @@ def test_a_hole_beside_the_very_last_or_first_frames_is_found(end: str, gone: in
 @pytest.mark.parametrize(
     ("count", "gone"),
     [
-        pytest.param(count, gone, marks=() if (count + gone) % 2 else pytest.mark.campaign)
+        pytest.param(count, gone, marks=() if (count, gone) in ((1, 2), (4, 3)) else pytest.mark.campaign)
         for count in (1, 2, 3, 4, 5)
         for gone in (2, 3)
     ],
@@ -328,7 +331,7 @@ def test_a_single_hole_that_was_guessed_as_a_rule_lies_where_frames_show_it(plan
     assert course.track.index.tolist() == true.tolist()
 
 
-@pytest.mark.parametrize("missing", [3, 7])
+@pytest.mark.parametrize("missing", [3, pytest.param(7, marks=pytest.mark.campaign)])
 def test_where_many_frames_are_missing_the_strobe_may_have_started_again(plan: Plan, missing: int) -> None:
     shot = shot_of(plan, FRAMES + missing)
     kept = np.delete(shot.frames.mean(axis=2, dtype=np.float64), slice(31, 31 + missing), axis=0)
