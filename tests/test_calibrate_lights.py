@@ -51,7 +51,9 @@ def test_gloss_and_saturation_are_weighed_out_of_a_matte_sphere() -> None:
     np.testing.assert_allclose([light.intensity for light in found], 1.0, rtol=0.01)
 
 
-@pytest.mark.parametrize(("radii", "within_deg"), [(50.0, 0.3), pytest.param(25.0, 0.3, marks=pytest.mark.campaign), (5.0, 0.5)])
+@pytest.mark.parametrize(
+    ("radii", "within_deg"), [(50.0, 0.3), pytest.param(25.0, 0.3, marks=pytest.mark.campaign), (5.0, 0.5)]
+)
 def test_lamps_near_a_matte_sphere_are_where_they_stand(radii: float, within_deg: float) -> None:
     """Taken for distant ones they seem to stand up to 1.3, 2.6 and 13 degrees from there."""
     directions, strengths = ways(4), np.full((4, 3), 0.5)

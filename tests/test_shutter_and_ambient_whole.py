@@ -77,7 +77,9 @@ def at_its_best(tmp_path_factory: pytest.TempPathFactory) -> tuple[float, float]
     return solved(film(tmp_path_factory.mktemp("best")))
 
 
-@pytest.mark.parametrize(("shutter", "readout"), [(180.0, 0.01), pytest.param(90.0, 0.01, marks=pytest.mark.campaign), (90.0, 0.0025)])
+@pytest.mark.parametrize(
+    ("shutter", "readout"), [(180.0, 0.01), pytest.param(90.0, 0.01, marks=pytest.mark.campaign), (90.0, 0.0025)]
+)
 def test_below_360_degrees_a_standing_ball_loses_nothing(
     shutter: float, readout: float, tmp_path: Path, at_its_best: tuple[float, float]
 ) -> None:

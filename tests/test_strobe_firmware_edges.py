@@ -169,7 +169,9 @@ def random_slot(dice: random.Random, number: int, caps: Capabilities) -> Slot:
             return made
 
 
-@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(4, 12))])
+@pytest.mark.parametrize(
+    "seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(4, 12))]
+)
 def test_any_cycle_that_is_taken_is_played_to_the_tick(
     emulate: Callable[..., list[str]], upload: Callable[..., list[str]], tmp_path: Path, seed: int
 ) -> None:
