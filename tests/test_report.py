@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from coarse_ball import COARSE_BALL
 from filmed import filmed
 
 from psvideo.cli.app import main
@@ -30,6 +31,7 @@ THREE_LIGHTS = SPHERE.replace("frames = 12", "frames = 21").replace(
     "readout_s = 0.01\n", "readout_s = 0.01\nfull_well_e = 20000.0\nread_e = 5.0\n"
 )
 FIVE_LIGHTS = THREE_LIGHTS.replace('\n[[object]]\nmesh = "sphere"\n', FIVE).replace("albedo = 0.8", PAINT)
+MOVING = FIVE_LIGHTS.replace('mesh = "sphere"', f'mesh = "{COARSE_BALL}"')
 NAMES = ("key", "left", "top", "low", "rim")
 
 
@@ -53,8 +55,8 @@ SCENES = {
     "dead": strength(FIVE_LIGHTS, "left", 0.0001),
     "ambient": FIVE_LIGHTS + "\n[ambient]\nlevel = 0.25\n",
     "sun": FIVE_LIGHTS + "\n[ambient]\nlevel = 0.7\n",
-    "spinning": FIVE_LIGHTS + "motion = { spin_deg_per_s = 200.0, axis = [0.0, 1.0, 0.0] }\n",
-    "passing": FIVE_LIGHTS + "motion = { velocity_m_per_s = [1.2, 0.0, 0.0] }\n",
+    "spinning": MOVING + "motion = { spin_deg_per_s = 200.0, axis = [0.0, 1.0, 0.0] }\n",
+    "passing": MOVING + "motion = { velocity_m_per_s = [1.2, 0.0, 0.0] }\n",
     "dropped": FIVE_LIGHTS.replace("frames = 21", "frames = 30") + "\n[output]\ndropped = [9, 10]\n",
     "cut": FIVE_LIGHTS.replace("flash_s = 0.001", "flash_s = 0.001\ndark_s = 0.007"),
     "half_open": FIVE_LIGHTS.replace("shutter_deg = 360.0", "shutter_deg = 180.0"),

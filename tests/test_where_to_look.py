@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from coarse_ball import COARSE_BALL
 from filmed import filmed
 from picture_file import read_picture
 from written_movies import write_rgb16
@@ -19,7 +20,9 @@ FRAMES, LATE = 130, 80
 """A check looks at the first 30 frames, and at 60 where these show nothing; LATE of them come before the subject."""
 SCENES = {
     "stands": SPHERE.replace("frames = 12", f"frames = {FRAMES}"),
-    "enters": SPHERE.replace("frames = 12", f"frames = {FRAMES}").replace(
+    "enters": SPHERE.replace("frames = 12", f"frames = {FRAMES}")
+    .replace('mesh = "sphere"', f'mesh = "{COARSE_BALL}"')
+    .replace(
         "albedo = 0.8",
         "albedo = 0.8\nposition_m = [-2.6, 0.0, 0.0]\n[object.motion]\nvelocity_m_per_s = [2.2, 0.0, 0.0]",
     ),

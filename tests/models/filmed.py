@@ -3,11 +3,14 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from coarse_ball import write_coarse_ball
+
 from psvideo.cli.app import main
 
 
 def filmed(folder: Path, scenes: Mapping[str, str]) -> Callable[[str], Path]:
     """Return what gives the clip of a scene by name, filmed into the folder once; ``scenes`` holds scene.toml texts."""
+    write_coarse_ball(folder)
 
     def film(name: str) -> Path:
         clip = folder / name
