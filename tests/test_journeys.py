@@ -205,7 +205,17 @@ def test_still_photographs_one_per_light_are_a_synced_clip(tmp_path: Path) -> No
     assert mean_error_deg(found, normals, np.ones((20, 30), np.bool_)) < 0.01
 
 
-def test_the_demo_ends_with_the_path_of_its_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("small", [True, pytest.param(False, marks=pytest.mark.campaign)])
+def test_the_demo_ends_with_the_path_of_its_picture(
+    small: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = (SCENES / "bust.toml").read_text()
+    for whole, part in (("width_px = 640", "320"), ("height_px = 360", "180"), ("frames = 60", "26")):
+        assert whole in scene
+        scene = scene.replace(whole, f"{whole.split()[0]} = {part}")
+    (tmp_path / "small.toml").write_text(scene)
+    if small:
+        monkeypatch.setattr("psvideo.runs.demo.builtin_scene", lambda: tmp_path / "small.toml")
     assert run("demo", "-o", tmp_path / "demo") == 0
     last = capsys.readouterr().out.strip().splitlines()[-1]
     picture = cv2.imread(last)
