@@ -268,7 +268,7 @@ def test_a_readout_longer_than_the_frame_is_refused() -> None:
         (Fraction(60), 40.3, "top-down", "step by"),
         (Fraction(60), -40.3, "bottom-up", "step by"),
         (Fraction(1013, 20), 40.3, "unknown", "alike both ways"),
-        (Fraction(2026, 33), 40.3, "unknown", "alike both ways"),
+        pytest.param(Fraction(2026, 33), 40.3, "unknown", "alike both ways", marks=pytest.mark.campaign),
     ],
 )
 def test_the_way_of_reading_shows_in_the_stripes_steps(
