@@ -2,8 +2,8 @@
 
 Neighbours of the same colour suggest a normal and an albedo (``neighbours``), which the one or two lights that reach
 the pixel correct (``hernandez2011``). Pixels are filled in the order of their distance from solved ones. A step to
-another colour counts as a long one, so that a surface is filled from itself, and not across an outline. A solved pixel
-in which a shadow ends has a normal of its own, which is none to go on from.
+another colour counts as a long one, so that a surface is filled from itself, and not across an outline. ``rim`` says
+which solved pixels are none to go on from.
 """
 
 import numpy as np
@@ -16,15 +16,18 @@ from psvideo.solve.filling.bucket_queue import BUCKETS, FOREVER, NONE, Queue, pu
 from psvideo.solve.filling.hernandez2011 import from_one, from_three, from_two
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours, known_of, misfit
-from psvideo.solve.filling.tiles import AT_RIM, ODD_AT_RIM, THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
+from psvideo.solve.filling.rim import mark_rim
+from psvideo.solve.filling.tiles import ALONE_AT_RIM, THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
 
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
 MOST_STEPS = np.float32(50)
+LONGEST = STEP * (1 + int(MOST_STEPS))
+BACK_PX, LIT_BACK_PX = 3, 2  # a step is held against so many pixels that lie before it, in colour and in light, since
+# an outline is a pixel or two wide, each of which is like the next
+LEAST_ALIKE = np.float32(0.4)  # neighbours less like a pixel in colour do not say its albedo
 ONWARD_OF_TWO, ONWARD = np.float32(1.0), np.float32(0.6)  # of neighbours' bend: all of it would burst from noise,
 # but for two lights, which leave less room for it
-BEHIND_PX = 2  # a normal beside a hole is held against those no farther from it that do not border on one,
-ODD = np.float32(np.cos(np.radians(10.0)))  # and is another than theirs from this angle on
 
 
 @FUSED.kept
@@ -40,7 +43,7 @@ def grow(tiles: Tiles, said: Said, where: NDArray[np.int32], queue: Queue, away:
     s = Said(lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour), said.noise)
     q = Queue(lent(queue.heads), lent(queue.following), lent(queue.preceding), lent(queue.distance))
     places, out = lent(where), lent(away)
-    _mark_rim(p, s, places)
+    mark_rim(p, s, places)
     waiting = now = begun = farthest = 0
     for pixel in range(len(places)):
         distance = _start(p, s, places, pixel)
@@ -69,50 +72,16 @@ def grow(tiles: Tiles, said: Said, where: NDArray[np.int32], queue: Queue, away:
 
 
 @FUSED.called
-def _mark_rim(p: Tiles, s: Said, places: NDArray[np.int32]) -> None:
-    """Mark the solved pixels beside those that are to be filled, and of these the ones whose normals are none of the
-    surface behind them: where a shadow ends within a pixel, a light shows a part of what it would."""
-    for pixel in range(len(places)):
-        row, col = places[pixel, 0], places[pixel, 1]
-        for y in range(max(row - 1, 0), min(row + 2, p.rows)):
-            for x in range(max(col - 1, 0), min(col + 2, p.cols)):
-                if lights_at(p, y, x) == THREE_LIGHTS:
-                    p.lights[tile_at(p, y, x), y & WITHIN, x & WITHIN] = AT_RIM
-    for pixel in range(len(places)):
-        row, col = places[pixel, 0], places[pixel, 1]
-        for y in range(max(row - 1, 0), min(row + 2, p.rows)):
-            for x in range(max(col - 1, 0), min(col + 2, p.cols)):
-                if lights_at(p, y, x) == AT_RIM and _is_odd(p, s, pixel, y, x):
-                    p.lights[tile_at(p, y, x), y & WITHIN, x & WITHIN] = ODD_AT_RIM
-
-
-@FUSED.called
-def _is_odd(p: Tiles, s: Said, pixel: int, row: int, col: int) -> bool:
-    """Whether the normal of a solved pixel beside one that is to be filled is another one than that of the surface
-    behind it, though that explains what lights show of the latter."""
-    a, b, c, count = ZERO, ZERO, ZERO, ZERO
-    for y in range(max(row - BEHIND_PX, 0), min(row + BEHIND_PX + 1, p.rows)):
-        for x in range(max(col - BEHIND_PX, 0), min(col + BEHIND_PX + 1, p.cols)):
-            if lights_at(p, y, x) == THREE_LIGHTS:
-                one, two, three = known_of(p, y, x)
-                a, b, c, count = a + one, b + two, c + three, count + ONE
-    if not count > ZERO:
-        return False
-    a, b, c = a / count, b / count, c / count
-    one, two, three = known_of(p, row, col)
-    lengths = np.sqrt((a * a + b * b + c * c) * (one * one + two * two + three * three))
-    return bool(a * one + b * two + c * three < ODD * lengths and misfit(s, pixel, a, b, c) < ONE)
-
-
-@FUSED.called
 def _start(p: Tiles, s: Said, places: NDArray[np.int32], pixel: int) -> int:
-    """Return the shortest step to a pixel from a solved neighbour, FOREVER where it has none."""
+    """Return the shortest step to a pixel from a solved neighbour, the longest from those that stand alone, FOREVER
+    where it has none."""
     row, col = places[pixel, 0], places[pixel, 1]
     nearest = FOREVER
     for side in range(4):
         y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
-        if 0 <= y < p.rows and 0 <= x < p.cols and THREE_LIGHTS <= lights_at(p, y, x) <= ODD_AT_RIM:
-            nearest = min(nearest, _step(p, s, y, x, row, col))
+        if 0 <= y < p.rows and 0 <= x < p.cols and THREE_LIGHTS <= lights_at(p, y, x) <= ALONE_AT_RIM:
+            alone = lights_at(p, y, x) == ALONE_AT_RIM
+            nearest = min(nearest, LONGEST if alone else _step(p, s, y, x, row, col))
     return nearest
 
 
@@ -138,14 +107,21 @@ def _push_around(p: Tiles, s: Said, q: Queue, row: int, col: int, now: int, fart
 @FUSED.called
 def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
     """The distance from a pixel with a normal to its neighbour (y, x), the longer the more their colours differ, and
-    the less what is known of the former explains what lights show of the latter."""
-    red, blue, noise = colour_of(p, s, row, col)
+    the less what is known of the former explains what lights show of the latter; or of those with a normal that lie
+    before it on the same way."""
     red_there, blue_there, noise_there = colour_of(p, s, y, x)
-    apart = (red - red_there) ** 2 + (blue - blue_there) ** 2
-    allowed = SAME_COLOUR**2 + noise + noise_there
     there = p.places[tile_at(p, y, x), y & WITHIN, x & WITHIN]
-    other_light = misfit(s, there, *known_of(p, row, col))
-    return int(np.float32(STEP) * (ONE + min(apart / allowed + other_light, MOST_STEPS)))
+    other_colour = other_light = ZERO
+    for back in range(BACK_PX):
+        v, u = row - back * (y - row), col - back * (x - col)
+        if not (0 <= v < p.rows and 0 <= u < p.cols) or lights_at(p, v, u) > ALONE_AT_RIM:
+            break
+        red, blue, noise = colour_of(p, s, v, u)
+        apart = (red - red_there) ** 2 + (blue - blue_there) ** 2
+        other_colour = max(other_colour, apart / (SAME_COLOUR**2 + noise + noise_there))
+        if back < LIT_BACK_PX:
+            other_light = max(other_light, misfit(s, there, *known_of(p, v, u)))
+    return int(np.float32(STEP) * (ONE + min(other_colour * other_colour + other_light, MOST_STEPS)))
 
 
 @FUSED.called
@@ -153,7 +129,9 @@ def _estimate(p: Tiles, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
     count = s.reached[pixel]
     onward = ONWARD_OF_TWO if count == 2 else ONWARD
-    nx, ny, nz, albedo, reds, blues, tx, ty, tz = from_neighbours(p, s, row, col, onward)
+    nx, ny, nz, albedo, reds, blues, tx, ty, tz, alike = from_neighbours(p, s, row, col, onward)
+    if count > 0 and alike < LEAST_ALIKE:
+        albedo = ZERO
     if count == THREE_LIGHTS:
         nx, ny, nz, albedo = from_three(s, pixel, nx, ny, nz, albedo, tx, ty, tz)
     elif count == 2:

@@ -11,7 +11,8 @@ from psvideo.compute.compiled import FUSED
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
-ALBEDO_SHARE = np.float32(0.1)  # how well the neighbours' albedo is that of a pixel
+ALBEDO_SHARE = np.float32(0.1)  # how well the neighbours' albedo is that of a pixel,
+OTHER_PAINT = np.float32(3.0)  # unless it is off by more than so many of that: then another paint is as likely
 BENT = np.float32(np.radians(15.0))  # how well the neighbours' normal is
 LEVEL = np.float32(np.radians(8.0))  # how well what they know of the surface across the way to it is
 BEYOND = np.float32(0.1)  # what faces away from the camera costs: squared over this
@@ -58,7 +59,9 @@ def from_two(
         apart = min(apart, TURN - apart)
         away = max(-(gz * COSINES[k] + dz * SINES[k]), ZERO) / BEYOND
         level = level_g * COSINES[k] + level_d * SINES[k]
-        cost = ((offset - LOG_COSINES[k]) * per_albedo) ** 2 + (apart / BENT) ** 2 + away * away + level * level
+        paint = ((offset - LOG_COSINES[k]) * per_albedo) ** 2
+        paint /= ONE + paint / (OTHER_PAINT * OTHER_PAINT)
+        cost = paint + (apart / BENT) ** 2 + away * away + level * level
         if closing:
             after, closing = cost, False
         if cost < least:
@@ -70,7 +73,7 @@ def from_two(
         angle += ANGLE_STEP * HALF * (before - after) / max(curve, TINY)
     c, d = np.cos(angle), np.sin(angle)
     found = length / max(c, LEAST_COSINE)
-    if albedo > ZERO:
+    if albedo > ZERO and abs(np.log(max(found, TINY) / albedo)) < OTHER_PAINT * ALBEDO_SHARE:
         found = min(max(found, albedo * (ONE - TWO * ALBEDO_SHARE)), albedo * (ONE + TWO * ALBEDO_SHARE))
     return gx * c + dx * d, gy * c + dy * d, gz * c + dz * d, found
 

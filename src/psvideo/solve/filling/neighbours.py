@@ -6,7 +6,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.neighbours_bend import Sums, bend_of, level_across
-from psvideo.solve.filling.tiles import ODD_AT_RIM, WITHIN, Tiles, tile_at
+from psvideo.solve.filling.tiles import ALONE_AT_RIM, WITHIN, Tiles, tile_at
 from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
 REACH_PX = 4  # neighbours are looked at so far in every direction,
@@ -14,7 +14,8 @@ SPREAD_PX = 2.0  # with weights that fall off so,
 SAME_COLOUR = np.float32(0.015)  # and with the colour: shares of red and blue that differ so much weigh a half;
 SAME_LIGHT = np.float32(0.2)  # what would show a light that differs by this share of it weighs a quarter,
 LEAST_SHARE = np.float32(1e-3)  # and nothing less than this;
-WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0, 1.0, 0.1], np.float32)  # of states: no, one, two lights, solved
+WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0, 1.0, 0.005, 0.005], np.float32)  # of states: no, one, two lights, solved,
+# solved beside a hole, and so but odd or alone there
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 THIRD, TINY = np.float32(1 / 3), np.float32(1e-6)
 WINDOW = np.exp(
@@ -74,7 +75,7 @@ def _summed(p: Tiles, s: Said, row: int, col: int) -> Sums:
     pixel's light."""
     channels = p.albedo.shape[1]
     red, blue, noise = colour_of(p, s, row, col)
-    weight = albedo = nx = ny = nz = reds = blues = ZERO
+    weight = likeness = albedo = nx = ny = nz = reds = blues = ZERO
     down = right = downs = rights = both = ZERO
     pixel = p.places[tile_at(p, row, col), row & WITHIN, col & WITHIN]
     nx_down = ny_down = nz_down = nx_right = ny_right = nz_right = ZERO
@@ -83,7 +84,7 @@ def _summed(p: Tiles, s: Said, row: int, col: int) -> Sums:
         for x in range(max(col - REACH_PX, 0), min(col + REACH_PX + 1, p.cols)):
             tile, u = tile_at(p, y, x), x & WITHIN
             state = p.lights[tile, v, u]
-            if state > ODD_AT_RIM:
+            if state > ALONE_AT_RIM:
                 continue
             there_red = decoded(p.albedo[tile, 0, v, u])
             there_blue = decoded(p.albedo[tile, channels - 1, v, u])
@@ -105,6 +106,7 @@ def _summed(p: Tiles, s: Said, row: int, col: int) -> Sums:
             w *= fits * fits + LEAST_SHARE
             dy, dx = np.float32(y - row), np.float32(x - col)
             weight += w
+            likeness += w * alike
             albedo += w * there * THIRD
             reds += w * share_red
             blues += w * share_blue
@@ -116,26 +118,30 @@ def _summed(p: Tiles, s: Said, row: int, col: int) -> Sums:
             nx_right, ny_right, nz_right = nx_right + wx * a, ny_right + wx * b, nz_right + wx * c
     return Sums(
         weight, albedo, reds, blues, nx, ny, nz, down, right, downs, rights, both, nx_down, ny_down, nz_down, nx_right,
-        ny_right, nz_right,
+        ny_right, nz_right, likeness,
     )  # fmt: skip
 
 
 @FUSED.inlined
 def from_neighbours(
     p: Tiles, s: Said, row: int, col: int, onward: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
+) -> tuple[
+    np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32, np.float32,
+    np.float32,
+]:  # fmt: skip
     """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those most that have
     its colour and explain its light; so much of their bend is taken ``onward``, so that a round surface stays round.
 
-    At last a vector that lies in the surface, across the way from the neighbours to the pixel; 0 where they lie all
+    Then a vector that lies in the surface, across the way from the neighbours to the pixel; 0 where they lie all
     around. How steep a surface is across that way changes along it as its steepness along it changes across it, since
-    slopes are those of one depth: so that is known where nothing else of the next normal is.
+    slopes are those of one depth: so that is known where nothing else of the next normal is. At last how alike in
+    colour they are, 0 to 1.
     """
     sums = _summed(p, s, row, col)
     if not sums.weight > ZERO:
-        return ZERO, ZERO, ONE, ZERO, THIRD, THIRD, ZERO, ZERO, ZERO
+        return ZERO, ZERO, ONE, ZERO, THIRD, THIRD, ZERO, ZERO, ZERO, ZERO
     one = ONE / sums.weight
-    albedo, reds, blues = sums.albedo * one, sums.reds * one, sums.blues * one
+    albedo, reds, blues, alike = sums.albedo * one, sums.reds * one, sums.blues * one, sums.alike * one
     c = bend_of(sums, one)
     tx, ty, tz = level_across(c)
     nx = c.nx - onward * (c.down * c.x_row + c.right * c.x_col)
@@ -143,4 +149,4 @@ def from_neighbours(
     nz = c.nz - onward * (c.down * c.z_row + c.right * c.z_col)
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
     one = ONE / max(length, TINY)
-    return nx * one, ny * one, nz * one, albedo, reds, blues, tx, ty, tz
+    return nx * one, ny * one, nz * one, albedo, reds, blues, tx, ty, tz, alike

@@ -37,7 +37,8 @@ class Bend(NamedTuple):
 
 class Sums(NamedTuple):
     """Weighted sums over a pixel's neighbours: of 1, of albedo, of shares of red and blue, of normals; of places, rows
-    ``down`` and columns ``right`` of the pixel, their squares and their product; of normals times places."""
+    ``down`` and columns ``right`` of the pixel, their squares and their product; of normals times places; of how alike
+    in colour they are."""
 
     weight: np.float32
     albedo: np.float32
@@ -57,6 +58,7 @@ class Sums(NamedTuple):
     nx_right: np.float32
     ny_right: np.float32
     nz_right: np.float32
+    alike: np.float32
 
 
 @FUSED.inlined

@@ -22,7 +22,7 @@ AT_ONCE = 1 << 18
 """This many pixels are brought back before the planes that they lie in are let go."""
 
 
-THREE_LIGHTS, AT_RIM, ODD_AT_RIM, UNKNOWN, LEFT_ALONE = 3, 4, 5, 9, 10  # of Tiles.lights
+THREE_LIGHTS, AT_RIM, ODD_AT_RIM, ALONE_AT_RIM, UNKNOWN, LEFT_ALONE = 3, 4, 5, 6, 9, 10  # of Tiles.lights
 NOWHERE = -1  # of Tiles.places and Tiles.table
 
 
@@ -32,9 +32,9 @@ class Tiles(NamedTuple):
     rows, cols: the picture's size. table: (row of tiles, column of tiles), a tile's number, NOWHERE of those that are
     not held; pixel (row, col) lies in the tile of its place over SIDE_PX, at what is left over. normals: (tile, 3, row,
     col). albedo: (tile, channel, row, col). lights: (tile, row, col), how many lights a pixel's normal is from,
-    THREE_LIGHTS where it was solved (once growing begins AT_RIM or ODD_AT_RIM beside pixels that are to be filled),
-    UNKNOWN where it is to be filled. places: (tile, row, col), the place of those among all of them, row by row;
-    NOWHERE of others.
+    THREE_LIGHTS where it was solved (once growing begins AT_RIM, ODD_AT_RIM or ALONE_AT_RIM beside pixels that are to
+    be filled), UNKNOWN where it is to be filled. places: (tile, row, col), the place of those among all of them, row
+    by row; NOWHERE of others.
     """
 
     rows: int
