@@ -33,7 +33,7 @@ def sharp_ball() -> tuple[np.ndarray, np.ndarray]:
 def shown(shade: np.ndarray, colour: np.ndarray) -> np.ndarray:
     """Return a plate whose pixels are means, with a camera's noise."""
     plate = cv2.resize(shade[..., None] * colour, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
-    return (plate + np.random.default_rng(4).normal(0, 0.0015, plate.shape)).astype(np.float32)
+    return np.asarray(plate + np.random.default_rng(4).normal(0, 0.0015, plate.shape), np.float32)
 
 
 def solved(plates: list[np.ndarray]) -> Surface:
@@ -90,8 +90,8 @@ def test_paint_that_three_lights_show_nowhere_does_not_bend_what_two_light() -> 
     plates = [shown(np.maximum(normals @ light, 0) * ~(cast & (n == 0)), colour) for n, light in enumerate(LIGHTS)]
     surface = solved(plates)
     assert surface.source is not None
-    small = cv2.resize(normals, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
-    small /= np.maximum(np.linalg.norm(small, axis=-1, keepdims=True), 1e-6)
+    small = np.asarray(cv2.resize(normals, (SIZE, SIZE), interpolation=cv2.INTER_AREA), np.float64)
+    small = small / np.maximum(np.linalg.norm(small, axis=-1, keepdims=True), 1e-6)
     painted = cv2.resize(spot.astype(np.uint8), (SIZE, SIZE), interpolation=cv2.INTER_NEAREST) > 0
     assert not (painted & (surface.source == MEASURED)).any()
     apart = angles_deg(surface.normals, small)[painted & (surface.source == TWO_LIGHTS)]
