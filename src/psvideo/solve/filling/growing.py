@@ -23,8 +23,7 @@ from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
 MOST_STEPS = np.float32(50)
 LONGEST = STEP * (1 + int(MOST_STEPS))
-BACK_PX, LIT_BACK_PX = 3, 2  # a step is held against so many pixels that lie before it, in colour and in light, since
-# an outline is a pixel or two wide, each of which is like the next
+BACK_PX = 3  # a step's colour is held against so many pixels that lie before it: an outline is two or three wide
 LEAST_ALIKE = np.float32(0.4)  # neighbours less like a pixel in colour do not say its albedo
 ONWARD_OF_TWO, ONWARD = np.float32(1.0), np.float32(0.6)  # of neighbours' bend: all of it would burst from noise,
 # but for two lights, which leave less room for it
@@ -106,12 +105,12 @@ def _push_around(p: Tiles, s: Said, q: Queue, row: int, col: int, now: int, fart
 
 @FUSED.called
 def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
-    """The distance from a pixel with a normal to its neighbour (y, x), the longer the more their colours differ, and
-    the less what is known of the former explains what lights show of the latter; or of those with a normal that lie
-    before it on the same way."""
+    """The distance from a pixel with a normal to its neighbour (y, x), the longer the more the latter's colour differs
+    from the former's or that of those before it on the same way, and the less what is known of the former explains what
+    lights show of the latter."""
     red_there, blue_there, noise_there = colour_of(p, s, y, x)
     there = p.places[tile_at(p, y, x), y & WITHIN, x & WITHIN]
-    other_colour = other_light = ZERO
+    other_light, other_colour = misfit(s, there, *known_of(p, row, col)), ZERO
     for back in range(BACK_PX):
         v, u = row - back * (y - row), col - back * (x - col)
         if not (0 <= v < p.rows and 0 <= u < p.cols) or lights_at(p, v, u) > ALONE_AT_RIM:
@@ -119,8 +118,6 @@ def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
         red, blue, noise = colour_of(p, s, v, u)
         apart = (red - red_there) ** 2 + (blue - blue_there) ** 2
         other_colour = max(other_colour, apart / (SAME_COLOUR**2 + noise + noise_there))
-        if back < LIT_BACK_PX:
-            other_light = max(other_light, misfit(s, there, *known_of(p, v, u)))
     return int(np.float32(STEP) * (ONE + min(other_colour * other_colour + other_light, MOST_STEPS)))
 
 
