@@ -430,6 +430,25 @@ def test_a_rig_that_explains_the_light_of_another_surface_is_no_good_rig(
     assert run("check", shot("good"), "--rig", shot("good") / "rig.toml") == 0
 
 
+def test_the_rig_beside_the_footage_is_held_against_the_plates_as_in_a_run(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A take with two lights exchanged in its rig.toml was called usable; normals took that file, and was not."""
+    clip = tmp_path / "clip"
+    shutil.copytree(shot("ring"), clip)
+    assert run("check", clip) == 0
+    assert f"note      The lights stand where {clip / 'rig.toml'} says." in capsys.readouterr().out
+    right = (clip / "rig.toml").read_text()
+    swapped = right.replace('"light0"', '"other"').replace('"light1"', '"light0"').replace('"other"', '"light1"')
+    (clip / "rig.toml").write_text(swapped)
+    assert run("check", clip, "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert "rig" in {one["subject"] for one in found["judgements"] if one["grade"] in ("doubtful", "bad")}
+    (tmp_path / "right.toml").write_text(right)
+    assert run("check", clip, "--rig", tmp_path / "right.toml") == 0
+    assert "The lights stand where" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(("haze", "doubted"), [(0.0, False), (0.08, True)])
 def test_light_that_is_added_alike_by_all_lamps_is_no_usable_take_before_the_run_either(
     shot: Callable[[str], Path], tmp_path: Path, *, haze: float, doubted: bool

@@ -11,13 +11,13 @@ from psvideo.clip import Clip, Kept, keeping_near
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.rig_folder import rig_of_take
+from psvideo.formats.rig_folder import rig_beside
 from psvideo.formats.rig_toml import read_rig
 from psvideo.plates.naming import named_by_rig
 from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames
 from psvideo.report.judgement import Judgement
 from psvideo.runs.instants.checked_rounds import lines_of
-from psvideo.runs.steps.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller, said_rig
 from psvideo.runs.steps.checked import Check, write_checks_page
 from psvideo.runs.steps.checked_frames import (
     frames_to_check,
@@ -54,8 +54,9 @@ def check(
 
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage.
-    - ``rig``: where the lights are, to find their order where there is no marker; the plates are compared with it.
-      ``first_light`` names the light of the clip's first complete flash, for plans without a marker.
+    - ``rig``: where the lights are, to find their order where there is no marker; the plates are compared with it. Of a
+      folder of rigs the one is taken that is named after the clip. Left out, rig.toml beside the footage; a note says
+      so. ``first_light`` names the light of the clip's first complete flash, for plans without a marker.
     - ``report``: a page (HTML) to write of the check, outside of the footage. Nothing else is written.
 
     ``watch`` is handed every long loop, and ``caller`` says how parameters are spelled.
@@ -115,7 +116,8 @@ def judged_take(
     began = time.monotonic()
     whole = open_take(path, plan=plan)
     clip = whole.clip
-    known = None if rig is None else read_rig(rig_of_take(rig, path), plan_lights=clip.plan.lights)
+    beside, said_of_rig = rig is not None or rig_beside(path) is not None, list[str]()
+    known = read_rig(said_rig(rig, path, said_of_rig.append), plan_lights=clip.plan.lights) if beside else None
     window = frames_to_check(clip.plan, clip.numbers)
     with _store(clip, window) as kept:
         start = replace(whole, numbers=window, kept=kept)
@@ -141,7 +143,7 @@ def judged_take(
         seconds=time.monotonic() - began,
         judgements=tuple(one.spelled(caller.spell) for one in lines),
         warnings=tuple(caller.spell(one) for one in clip.warnings if one != judged),
-        notes=tuple(map(caller.spell, (*clip.notes, *notes))),
+        notes=tuple(map(caller.spell, (*said_of_rig, *clip.notes, *notes))),
     )
 
 

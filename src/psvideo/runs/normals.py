@@ -13,7 +13,6 @@ from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.usd import require_usd
 from psvideo.formats.free_folders import unfinished_folder_of
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.rig_folder import rig_of_take
 from psvideo.model.choices import (
     PREVIEWS,
     USUAL_COMPRESSION,
@@ -40,7 +39,7 @@ from psvideo.runs.delivery.beforehand import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.piece_notes import noted_timing
 from psvideo.runs.instants.results import normals_run, piece_run
-from psvideo.runs.steps.caller import PYTHON, Caller, said_timing, say_kept, say_of_clip
+from psvideo.runs.steps.caller import PYTHON, Caller, said_rig, said_timing, say_kept, say_of_clip
 from psvideo.runs.steps.lighting import AskedLighting, read_lighting
 from psvideo.runs.steps.output import Output, take_rate
 from psvideo.sync.open_take import open_take
@@ -201,7 +200,7 @@ def normals(
     known.check()
     _check_averaged(denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
-    rig_path = _said_rig(rig_given, clip_path, caller)
+    rig_path = said_rig(rig_given, clip_path, caller.say)
     rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
@@ -230,14 +229,6 @@ def _check_averaged(results: int) -> None:
     """Raise UsageError where so many results cannot be averaged."""
     if not 1 <= results <= MOST_AVERAGED:
         raise UsageError(f"`denoise` {results}: expected a number from 1 to {MOST_AVERAGED}.")
-
-
-def _said_rig(named: Path | None, clip: Path, caller: Caller) -> Path:
-    """Return the rig that was named, or the one beside the footage, which is said."""
-    path = rig_of_take(named, clip)
-    if named is None:
-        caller.say(f"The lights stand where {path} says.")
-    return path
 
 
 def _delivery(asked: Asked, caller: Caller) -> Delivery:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from psvideo.cli.console import Voice, print_json
-from psvideo.cli.options.clip_and_run import FirstLight, OrderRig, PlanPath, Sharing
+from psvideo.cli.options.clip_and_run import FirstLight, PlanPath, RigPath, Sharing
 from psvideo.cli.options.records import spread
 from psvideo.errors import UsageError
 from psvideo.model.units import counted
@@ -48,7 +48,7 @@ def check(
         typer.Option("--report", metavar="FILE", help="Keep a page (HTML) of all checks, outside of the footage."),
     ] = None,
     plan: PlanPath = None,
-    rig: OrderRig = None,
+    rig: RigPath = None,
     first_light: FirstLight = None,
     sharing: Sharing,
     voice: Voice,

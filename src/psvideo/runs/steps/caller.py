@@ -3,8 +3,10 @@
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from psvideo.clip import Clip, Kept
+from psvideo.formats.rig_folder import rig_of_take
 from psvideo.model.timing import Timing
 
 _LOG = logging.getLogger("psvideo")
@@ -42,6 +44,15 @@ def say_of_clip(clip: Clip, caller: Caller) -> None:
         caller.warn(warning)
     for note in clip.notes:
         caller.detail(note)
+
+
+def said_rig(named: Path | None, clip: Path, say: Callable[[str], None]) -> Path:
+    """Return the rig that was named, or the one beside the footage, of which ``say`` hears. Raises UsageError as
+    ``rig_of_take`` does."""
+    path = rig_of_take(named, clip)
+    if named is None:
+        say(f"The lights stand where {path} says.")
+    return path
 
 
 def said_timing(timing: Timing, caller: Caller) -> Timing:
