@@ -37,6 +37,11 @@ ALL_REACHED = 0.995
 EXPOSURE_FIRST = "See the line on exposure first: noise alone may turn normals that far."
 RIG_FIRST = "See the line on the rig first: normals that are off for the lights' sake are no better for more light."
 LIGHTS_FIRST = "See the line on lights first: what it names costs normals."
+NEAR_ONES = (
+    "The lights are near, and few of them do not show well how far away each part is: give a depth that is known "
+    '(`depth`), use more lights, or measure these again. Normals with `aov=["error"]` say how far off each pixel may '
+    "be."
+)
 CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
 
 
@@ -116,6 +121,8 @@ def _trusting(observed: Observed) -> str:
             'Normals with `aov=["error"]` say how far off each pixel may be.'
         )
     if off_deg(observed) is None and steady_beyond_noise(observed) and not said:
+        if observed.points is not None and observed.points.near:
+            return NEAR_ONES
         return (
             "Measure the lights again, clear the air and darken the room, or use more lights; brighter ones do not "
             'help. Normals with `aov=["error"]` say how far off each pixel may be.'

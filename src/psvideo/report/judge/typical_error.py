@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from psvideo.report.observe.against_noise import usual
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED
@@ -16,6 +17,8 @@ LOST_DEG = 15.0
 MEAN_OF_HELD = 0.83
 """Predicted errors hold two thirds of the true ones; this is the mean as a share of it, for errors in two directions
 (Rayleigh)."""
+CHANGE_OF_SPREAD = 1.18
+"""The median difference of two normals, in standard deviations of one (both directions together; Rayleigh)."""
 HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
@@ -62,9 +65,23 @@ def by_slope_deg(facts: Sequence[InstantFacts]) -> float:
 
 def steady_beyond_noise(observed: Observed) -> bool:
     """Return whether normals at rest change so little between results that noise is not to blame for what is not
-    trusted, and the rig explains the plates: of few lights nothing else separates gloss or compression from noise."""
+    trusted, and the rig explains the plates: of few lights nothing else separates gloss or compression from noise.
+
+    What is not trusted shows the mean of several rounds, which hides their noise: the plates' own counts as well."""
     known = [one.change.normals_deg for one in observed.facts if one.change is not None]
-    return rig_explains(observed) and bool(known) and float(np.median(known)) < COMMON_DEG
+    steady = bool(known) and max(float(np.median(known)), noise_changes_deg(observed)) < COMMON_DEG
+    return steady and rig_explains(observed)
+
+
+def noise_changes_deg(observed: Observed) -> float:
+    """Return by how much the plates' noise turns a typical normal that faces the camera from one round to the next, in
+    the median; 0 where the rig or the noise is not known."""
+    if observed.points is None or not observed.closely.noises:
+        return 0.0
+    lights = observed.points.vectors[:, observed.firing].mean(axis=0)
+    spread = np.linalg.pinv(lights / np.abs(lights[:, 2]).max())  # by the brightest light, as the noise is
+    turned = float(np.sqrt(np.sum(spread[:2] ** 2))) / usual(observed.closely.noises).pixel_ratio
+    return CHANGE_OF_SPREAD * float(np.degrees(turned))
 
 
 def rig_explains(observed: Observed) -> bool:

@@ -14,11 +14,13 @@ from psvideo.solve.normals.plate_noise import noise_of
 @dataclass(frozen=True, kw_only=True)
 class AgainstNoise:
     """The ``level`` of a subject's light (1.0 = saturation): its median under the brightest light of every pixel; and
-    the variance of a plate's sample at a level, ``read + photon * level``."""
+    the variance of a plate's sample at a level, ``read + photon * level``. A pixel has so many ``samples``, one for
+    each channel."""
 
     level: float
     read: float
     photon: float
+    samples: int = 1
 
     @property
     def ratio(self) -> float:
@@ -29,6 +31,11 @@ class AgainstNoise:
     def sigma(self) -> float:
         """The standard deviation at the subject's level."""
         return float(np.sqrt(self.read + self.photon * self.level))
+
+    @property
+    def pixel_ratio(self) -> float:
+        """How many times its standard deviation the light of a pixel is, in the mean of its samples."""
+        return self.ratio * float(np.sqrt(self.samples))
 
     def stops_to(self, ratio: float) -> float:
         """Return by how many stops more light is as many times its noise: the root of ``(kL)² = ratio² (read + photon
@@ -44,8 +51,10 @@ def against_noise(one: Round, seen: Seen) -> AgainstNoise | None:
     if not known.any():
         return None
     level = median(np.where(seen.shown, seen.bright, 0).max(axis=0)[known])
-    noise = noise_of([plate.picture for plate in one.plates])
-    return None if level <= 0 else AgainstNoise(level=float(level), read=noise.read, photon=noise.photon)
+    if level <= 0:
+        return None
+    noise, samples = noise_of([plate.picture for plate in one.plates]), int(np.prod(one.plates[0].shape[2:]))
+    return AgainstNoise(level=float(level), read=noise.read, photon=noise.photon, samples=samples)
 
 
 def usual(found: Sequence[AgainstNoise]) -> AgainstNoise:

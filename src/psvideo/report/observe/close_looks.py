@@ -84,7 +84,7 @@ class CloseLooks:
 
     def look_into_shadow(self, surface: Surface, seen: Seen, points: RigPoints) -> None:
         """Look what is left of a lamp's light where it cannot reach; of a rig that sends light alike everywhere."""
-        if len(points.vectors) > 1:
+        if points.near:
             return
         step, ways = step_of(*surface.valid.shape), points.vectors[0]
         found = shadow_light(seen.bright, seen.shown, surface, ways, step=step)

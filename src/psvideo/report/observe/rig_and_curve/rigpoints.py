@@ -37,6 +37,11 @@ class RigPoints:
     vectors: Doubles
     strengths_all_one: bool = False
 
+    @property
+    def near(self) -> bool:
+        """Whether lights are so near that the rig sends other light to every point."""
+        return len(self.vectors) > 1
+
     def light(self, one: Round) -> PointLight:
         """Return the light of a round at the points."""
         columns = []
