@@ -33,6 +33,13 @@ from psvideo.sync.take_timing import find_timing
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
 SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")
 EVEN = ((0.6, 0.0), (0.0, 0.6), (-0.6, 0.0), (0.0, -0.6))
+MOVES = (
+    "albedo = 0.8",
+    (
+        'albedo = { pattern = "noise", colour = 0.8, second = 0.3, size_m = 0.15 }\n'
+        "motion = { sway_m = [0.2, 0.0, 0.0], sway_hz = 2.0 }"
+    ),
+)
 SCENES = {
     "good": SCENE,
     "dead": SCENE.replace('name = "left"\n', 'name = "left"\nintensity = 0.0001\n'),
@@ -42,6 +49,9 @@ SCENES = {
         "".join(f'[[light]]\nname = "light{n}"\ndirection = [{x}, {y}, 0.8]\n' for n, (x, y) in enumerate(EVEN)),
         SCENE,
     ),
+    "half": SCENE.replace("frames = 26", "frames = 40").replace("360.0", "180.0"),
+    "half moves": SCENE.replace("frames = 26", "frames = 40").replace("360.0", "180.0").replace(*MOVES),
+    "quarter moves": SCENE.replace("frames = 26", "frames = 40").replace("360.0", "90.0").replace(*MOVES),
     "room": SCENE + "\n[ambient]\nlevel = 0.6\n",
 }
 
@@ -428,6 +438,30 @@ def test_a_rig_that_explains_the_light_of_another_surface_is_no_good_rig(
     assert run("check", shot("good"), "--rig", tmp_path / "mirrored.toml") == 1
     assert "normals cannot be those of one surface" in " ".join(capsys.readouterr().out.split())
     assert run("check", shot("good"), "--rig", shot("good") / "rig.toml") == 0
+
+
+def test_below_360_degrees_what_moves_is_said_to_be_lost_and_what_stands_is_not(shot: Callable[[str], Path]) -> None:
+    """No two plates were whole, so that motion was "not known" and takes that lost 84 % passed for usable."""
+    found = {name: ps.check(shot(name)) for name in ("half", "half moves", "quarter moves")}
+    motion = {name: next(line for line in one.judgements if line.subject == "motion") for name, one in found.items()}
+    assert [line.grade for line in motion.values()] == ["good", "bad", "unknown"]
+    assert found["half"].usable
+    assert motion["half"].found == "Nothing moves."
+    assert "px from round to round, and the shutter is open for 180 degrees only" in motion["half moves"].found
+    assert "most of what moves is lost or comes out wrong" in motion["half moves"].found
+    assert "Whether anything moves is not known: the shutter is open for 90 degrees" in motion["quarter moves"].found
+    for name in ("half moves", "quarter moves"):
+        assert motion[name].advice == "Shoot at 360 degrees, or let the subject stand still."
+
+
+def test_below_360_degrees_neither_rig_nor_surface_is_blamed_for_what_moves(
+    shot: Callable[[str], Path], tmp_path: Path
+) -> None:
+    report = ps.normals(shot("half moves"), out=tmp_path / "out", preview=())
+    lines = {line.subject: line for line in report.judgements}
+    assert lines["motion"].grade == "doubtful"
+    assert "rig" not in lines or lines["rig"].grade in ("good", "unknown")
+    assert lines["validity"].advice.startswith("See the line on motion first")
 
 
 def test_the_rig_beside_the_footage_is_held_against_the_plates_as_in_a_run(

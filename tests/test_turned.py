@@ -40,7 +40,7 @@ from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.sequence import Round
 from psvideo.plates.upright import upright, upright_window
 from psvideo.report.observe.facts import instant_facts
-from psvideo.report.observe.motion import glimpse, motion_between
+from psvideo.report.observe.motion import Motion, glimpse, motion_between
 from psvideo.report.observe.observed import Observed
 
 ONE = 65536
@@ -295,7 +295,9 @@ def test_what_frames_show_of_the_room_is_looked_at_as_it_is_seen(turn: Turn) -> 
 
 @TURNS
 def test_rows_that_no_frame_saw_are_no_motion(turn: Turn) -> None:
-    assert motion_between(glimpse(plate(turn, slice(0, 32))), glimpse(plate(turn, slice(32, 64), at=1))) is None
+    found = motion_between(glimpse(plate(turn, slice(0, 32))), glimpse(plate(turn, slice(32, 64), at=1)))
+    assert found == Motion(speed_px_s=0.0, share=0.0)
+    assert motion_between(glimpse(plate(turn, slice(0, 48))), glimpse(plate(turn, slice(48, 96), at=1))) is None
 
 
 @TURNS

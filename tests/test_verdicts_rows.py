@@ -296,3 +296,30 @@ def test_how_much_moves_is_no_share_of_the_picture_where_only_what_is_lit_shows_
         one.add(Round(number=number, plates=(plate,)))
     found = of_motion.motion(plan_of(one.lights, fps=1), timing_of(frame_period_s=1.0), one).found
     assert re.match(words, found)
+
+
+@pytest.mark.parametrize("px", [0, 2])
+@pytest.mark.parametrize("shared", [20, 30, 60])
+def test_motion_is_seen_in_the_rows_that_two_plates_share_and_in_no_noise_beside_them(shared: int, px: int) -> None:
+    """Rows that saw a sixth of a flash are as many times as noisy. Pieces of 24 to 31 rows ended OpenCV's search."""
+    rng = np.random.default_rng(shared)
+
+    def shown(number: int, rows: slice) -> LightPlate:
+        wall = np.roll(Footage(shape="waves", lights=1)._plates(ring(1), 0)[0], px * number, axis=1)
+        noise = np.full((SIZE, 1), 0.004)
+        noise[rows.start : rows.start + 8] *= 6
+        noise[rows.stop - 8 : rows.stop] *= 6
+        seen = np.zeros(SIZE, np.bool_)
+        seen[rows] = True
+        light = ((wall + noise * rng.normal(size=wall.shape)) * seen[:, None]).astype(np.float32)
+        return LightPlate(light="a", number=number, time_s=float(number), picture=mixture_of(light), seen=seen)
+
+    middle = SIZE // 2
+    one = glimpse(shown(0, slice(0, middle + shared // 2 + 8)))
+    found = motion_between(one, glimpse(shown(1, slice(middle - shared // 2 - 8, SIZE)), one.white))
+    if shared == 20:
+        assert found is None
+        return
+    assert found is not None
+    assert found.speed_px_s == pytest.approx(px, abs=0.3)
+    assert found.share > 0.5 if px else found.share == 0

@@ -7,6 +7,7 @@ from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import ceiling_of, exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_motion import apart_in_round_px, motion
+from psvideo.report.judge.of_part_of_rows import first_seen_whole
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.of_rows import coverage, in_step
 from psvideo.report.judge.of_steadiness import focus, steadiness
@@ -48,6 +49,9 @@ def judgements(
     )
     apart_px = 0.0 if aligned else apart_in_round_px(plan, timing, observed)
     lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt, apart_px=apart_px))
+    moving = motion(plan, timing, observed, aligned=aligned, opened=opened)
+    first = first_of_all((*exposed, *fired, *lit), curve_doubted=bool(curve_doubt or timing.half))
+    first = first or first_seen_whole(moving, plan, timing)
     return (
         *on_time,
         *([read_otherwise(timing.half)] if timing.half else []),
@@ -56,14 +60,12 @@ def judgements(
         *([levels] if levels else []),
         *fired,
         ambient(observed),
-        motion(plan, timing, observed, aligned=aligned, opened=opened),
+        moving,
         focus(observed),
         *lit,
         *accuracy(observed),
         *distance(observed),
-        *validity(
-            observed, first=first_of_all((*exposed, *fired, *lit), curve_doubted=bool(curve_doubt or timing.half))
-        ),
+        *validity(observed, first=first),
         *what_moves(observed.facts, aligned=aligned),
         *steadiness(observed.facts),
     )

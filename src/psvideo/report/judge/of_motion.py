@@ -1,11 +1,15 @@
 """Judgements on motion: how far things move from flash to flash, or whether photographs are aligned."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from psvideo.model.cost.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import NOTICED
+from psvideo.report.judge.of_part_of_rows import MOST_LENT_PX, lent, round_s, seen_in_part, unknown_in_part
+from psvideo.report.judge.of_rows import is_blind
 from psvideo.report.judge.of_what_moves import what_moves
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import LEAST_SHOWN_PX, Astray
@@ -29,14 +33,20 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
     """Judge how far the fastest parts move from flash to flash, and within one; ``opened``: under an open shutter."""
     shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
     speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
+    blind = plan.mode != "synced" and is_blind(timing)
     if not shares:
-        return _places(observed)
+        return unknown_in_part(timing) if blind else _places(observed)
     share = float(np.quantile(shares, OFTEN))
     if len(speeds) < LEAST_FOLLOWED * len(shares):
-        return _not_followed(share, aligned=aligned, opened=opened)
+        found = _not_followed(share, aligned=aligned, opened=opened)
+        return seen_in_part(found, timing) if blind else found
     flash_s = _flash_s(plan, timing)
     speed, most_px = float(np.quantile(speeds, OFTEN)), max(speeds) * flash_s
     step_px = speed * flash_s
+    if blind and (lent_px := speed * round_s(plan, timing)) > FAST_PX:
+        grave = lent_px > MOST_LENT_PX and share > FEW_MOVE and not aligned
+        found = lent(f"{_what_moves(share)} moves, by up to {step_px:.1f} px", timing, lent_px=lent_px, grave=grave)
+        return replace(found, found=found.found + _unfrozen(plan, timing, observed, speed))
     if step_px <= FAST_PX:
         return Judgement(subject="motion", grade="good", found=_slow(step_px, most_px))
     longest_s = max(plan.flashes[slot].duration_s for slot in plan.lit_slots)

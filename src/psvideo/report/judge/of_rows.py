@@ -43,7 +43,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
     where there is no dark slot."""
     rows = _rows_of(plan, timing, observed, take_s)
     said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, rows)]
-    holes = list(_dropped(timing, observed, alone=not (rows.show_ambient or _is_blind(timing))))
+    holes = list(_dropped(timing, observed, alone=not (rows.show_ambient or is_blind(timing))))
     if rows.unseen > MOST_UNSEEN and not said and not _lost_in_holes(timing, observed, rows):
         said.append(_unexplained(timing, rows))
     yield from said
@@ -61,7 +61,7 @@ def _rows_of(plan: Plan, timing: Timing, observed: Observed, take_s: float | Non
     """Return what rounds lack; of a take that lasts ``take_s`` and is only begun, what they will lack at its end."""
     unseen = max((one.unseen_share for one in observed.facts), default=0.0)
     borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
-    blind = _is_blind(timing)
+    blind = is_blind(timing)
     show_ambient = plan.mode != "synced" and not blind and not any(flash.is_dark for flash in plan.flashes)
     if take_s is None:
         return _Rows(unseen, borrowed, tuple(one.unseen_share for one in observed.facts), show_ambient)
@@ -121,8 +121,14 @@ def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
         )
 
 
-def _is_blind(timing: Timing) -> bool:
+def is_blind(timing: Timing) -> bool:
+    """Return whether the shutter is closed for so long that every flash is missed by some rows."""
     return timing.exposure_s / timing.frame_period_s < BLIND
+
+
+def opened(timing: Timing) -> str:
+    """Say for how long the shutter is open."""
+    return f"the shutter is open for {360 * timing.exposure_s / timing.frame_period_s:.0f} degrees only"
 
 
 def _as_found(plan: Plan, timing: Timing) -> Plan:
@@ -132,7 +138,7 @@ def _as_found(plan: Plan, timing: Timing) -> Plan:
 def in_step(plan: Plan, timing: Timing) -> bool:
     """Tell whether flashes meet the same rows again and again, so that some rows never see some lights."""
     found = _as_found(plan, timing)
-    return _is_blind(timing) and never_shown(found, clock_offset_ppm=timing.clock_offset_ppm) > IN_STEP
+    return is_blind(timing) and never_shown(found, clock_offset_ppm=timing.clock_offset_ppm) > IN_STEP
 
 
 def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
@@ -140,15 +146,15 @@ def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
     that one lacks, and the rest serves."""
     unseen, borrowed, rounds = rows.unseen, rows.borrowed, rows.rounds
     serves = unseen <= LOST_UNSEEN or _few(sum(one > LOST_UNSEEN for one in rounds), len(rounds))
-    if not _is_blind(timing):
+    if not is_blind(timing):
         return
-    opened = f"the shutter is open for {360 * timing.exposure_s / timing.frame_period_s:.0f} degrees only"
+    shutter = opened(timing)
     if unseen > MOST_UNSEEN and in_step(plan, timing):
         other_s = dark_s_out_of_step(_as_found(plan, timing))
         yield Judgement(
             subject="rows",
             grade=_grade(unseen),
-            found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {opened}, and the strobe "
+            found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {shutter}, and the strobe "
             f"keeps step with the frames, so that every {frames_in_step(plan)} frames its flashes meet the same rows.",
             advice="Shoot at 360 degrees"
             + (", or in rolling mode" if plan.mode == "half-rate" else "")
@@ -160,15 +166,15 @@ def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
         yield Judgement(
             subject="rows",
             grade="doubtful",
-            found=f"{opened.capitalize()}: {shares} % of a round's rows come from other rounds. What "
-            f"stands still loses nothing by it, what moves in them is left out.{_lacking(rows)}",
+            found=f"{shutter.capitalize()}: {shares} % of a round's rows come from other rounds. What "
+            f"stands still loses nothing by it, what moves is lost there or comes out wrong.{_lacking(rows)}",
             advice="Shoot at 360 degrees" + (", or film longer." if _too_short(rows) else "."),
         )
     elif unseen > MOST_UNSEEN:
         yield Judgement(
             subject="rows",
             grade=_grade(unseen),
-            found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: {opened}.",
+            found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: {shutter}.",
             advice="Shoot at 360 degrees.",
         )
 

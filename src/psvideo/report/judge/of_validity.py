@@ -120,7 +120,7 @@ def _trusting(observed: Observed) -> str:
             "shows how far normals are off, or six or more at different angles to the lens, which take most of it off. "
             'Normals with `aov=["error"]` say how far off each pixel may be.'
         )
-    if off_deg(observed) is None and steady_beyond_noise(observed) and not said:
+    if off_deg(observed) is None and steady_beyond_noise(observed) and not (said or moves(observed.facts)):
         if observed.points is not None and observed.points.near:
             return NEAR_ONES
         return (

@@ -3,7 +3,8 @@
 ``observed`` gathers all of it, round by round; a round's own numbers are its ``facts``, and those of all rounds
 ``kept_facts``; ``close_looks`` are what is looked at in rounds 1, 2, 4, 8 and so on. Each has a module: ``levels``
 (exposure), ``against_noise`` (light and noise), ``code_steps`` (between a file's levels), ``hidden_level`` (of a sensor
-that saturates below the largest code), ``motion`` (``watched_motion``: of one light, as plates pass), ``focus``,
+that saturates below the largest code), ``motion`` (``watched_motion``: of one light, as plates pass; in the rows
+``shown_alike``), ``focus``,
 ``shadow`` (what is left where no light reaches), ``steadiness``, ``worst`` (instants to look at), over ``thinned``
 pixels. Whether rig and curve are right, and whether photographs are aligned, are rooms of their own:
 ``rig_and_curve``, ``alignment``.

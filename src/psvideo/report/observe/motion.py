@@ -16,6 +16,7 @@ from psvideo.plates.align.shake.registered import Shift, correlation, registered
 from psvideo.plates.align.velocity.flow import TOE, pixel_places
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.several_lights.clipped_flashes import coarser, filled_of, vague_between
+from psvideo.report.observe.shown_alike import Place, shown_alike, thinner
 
 WIDTH_PX = 480
 LEAST_CHANGE, NOISE_FACTOR = 1.5, 5.0
@@ -46,14 +47,14 @@ FOLLOWED = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class Glimpse:
-    """A plate as motion is judged by: ``codes`` (row, col), how many picture pixels one of theirs is, and when, and
-    where it says nothing, ``filled``."""
+    """A plate as motion is judged by: ``codes`` (row, col), how many picture pixels one of theirs is, and when; which
+    rows it shows, ``shown`` (row, 1), or (1, col) where they are columns, and where it says nothing, ``filled``."""
 
     codes: NDArray[np.uint8]
     scale: float
     time_s: float
     white: float
-    seen: bool
+    shown: Flags
     filled: Bytes | None = None
 
 
@@ -90,19 +91,30 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     grey -= np.float32(np.sqrt(TOE))
     grey *= np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     codes = (grey + np.float32(0.5)).astype(np.uint8)
-    whole = bool(plate.lines_seen.all())
+    shown = thinner(plate.lines_seen, chosen, step)
     scale_px = plate.shape[1] / grey.shape[1]
     filled = coarser(filled_of(plate, chosen), 1, step)
-    return Glimpse(codes=codes, scale=scale_px, time_s=plate.time_s, white=white, seen=whole, filled=filled)
+    return Glimpse(codes=codes, scale=scale_px, time_s=plate.time_s, white=white, shown=shown, filled=filled)
 
 
 def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
-    """Return what moved between two plates of one light; None where rows are missing."""
-    if not (before.seen and after.seen):
+    """Return what moved between two plates of one light, as a share of what both show; None where that is little."""
+    place = shown_alike(before.codes, after.codes, before.shown & after.shown)
+    if place is None:
         return None
     if (vague := vague_between(before.filled, after.filled)) is not None:
         after = replace(after, codes=np.where(vague, before.codes, after.codes))
-    one, other = (picture.codes.astype(np.float32) for picture in (before, after))
+    found = _motion(before, after, place)
+    if found.changed is None:
+        return found
+    changed = np.zeros(before.codes.shape, np.bool_)
+    changed[place] = found.changed
+    return replace(found, changed=changed)
+
+
+def _motion(before: Glimpse, after: Glimpse, place: Place) -> Motion:
+    """Return what moved in the place that two pictures both show."""
+    one, other = (picture.codes[place].astype(np.float32) for picture in (before, after))
     change = _change(one, other)
     changed = _changed(change)
     share, still = np.count_nonzero(changed) / changed.size, Motion(speed_px_s=0.0, share=0.0)
@@ -114,10 +126,7 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
         return Motion(speed_px_s=speed_px_s, share=float(goes_by.mean()), changed=goes_by)
     if share <= LEAST_BLOCKS:
         return still
-    search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
-    forward, backward = (
-        search.calc(*pair, None) for pair in ((before.codes, after.codes), (after.codes, before.codes))
-    )
+    forward, backward = _flow(before.codes, after.codes, place)
     returns = changed & _returns(forward, backward)
     followed = returns & _explained(one, other, forward)
     if followed.sum() < FOLLOWED * changed.sum():
@@ -125,6 +134,16 @@ def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     way = np.hypot(forward[..., 0], forward[..., 1])[followed] * before.scale
     speed = quantile(way, FASTEST) / abs(after.time_s - before.time_s)
     return Motion(speed_px_s=speed, share=float(returns.mean()), changed=_well_within(changed))
+
+
+def _flow(before: Bytes, after: Bytes, place: Place) -> tuple[Floats, Floats]:
+    """Return the flow there and back in a place, (row, col, 2), mirrored beyond it: OpenCV's search ends the process on
+    a piece of 31 rows and 96 columns, and is held back by what rests beside it."""
+    search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    beyond = [(part.start, size - part.stop) for part, size in zip(place, before.shape, strict=True)]
+    one, other = (np.pad(picture[place], beyond, mode="symmetric") for picture in (before, after))
+    forward, backward = (search.calc(*pair, None)[place] for pair in ((one, other), (other, one)))
+    return forward, backward
 
 
 def _changed(change: Floats) -> NDArray[np.bool_]:

@@ -18,13 +18,15 @@ WEAK_BESIDE = 1 / 8
 class WatchedMotion:
     """Motion between the plates of the ``watched`` light; left out, it is the first light's, or the brightest's where
     the first gives hardly any light in the first round. ``white`` is what counts as white, found with its first plate.
-    ``latest`` is what moved up to the newest plate."""
+    ``latest`` is what moved up to the newest plate, since the one before, or where these share too few rows, since the
+    one before that."""
 
     watched: str = ""
     white: float | None = None
     latest: Motion | None = None
     _first: dict[str, Glimpse] = field(default_factory=dict)
     _glimpse: Glimpse | None = None
+    _earlier: Glimpse | None = None
     _before: Motion | None = None
     _before_s: float = 0.0
 
@@ -51,12 +53,14 @@ class WatchedMotion:
         self._first.clear()
 
     def _look(self, plate: LightPlate) -> None:
-        before = self._glimpse
-        self._glimpse = glimpse(plate, self.white)
+        earlier = [one for one in (self._glimpse, self._earlier) if one is not None]
+        self._earlier, self._glimpse = self._glimpse, glimpse(plate, self.white)
         self.white = self._glimpse.white
         self._before, self.latest = self.latest, None
-        if before is not None:
+        for before in earlier:
             self.latest, self._before_s = motion_between(before, self._glimpse), before.time_s
+            if self.latest is not None:
+                return
 
     def stirring(self, time_s: float) -> Flags | None:
         """Return what moves at an instant, of the glimpses' pixels: what changed until then and changes from then on,
