@@ -323,3 +323,17 @@ def test_motion_is_seen_in_the_rows_that_two_plates_share_and_in_no_noise_beside
     assert found is not None
     assert found.speed_px_s == pytest.approx(px, abs=0.3)
     assert found.share > 0.5 if px else found.share == 0
+
+
+@pytest.mark.parametrize(("left", "grade"), [(0.1, "bad"), (0.3, "doubtful"), (None, "doubtful")])
+def test_below_360_degrees_a_run_that_leaves_hardly_anything_of_what_moves_is_not_usable(
+    left: float | None, grade: str
+) -> None:
+    one = Footage(shape="waves", lights=1, rounds=4).observed(0)
+    one.facts = KeptFacts(
+        replace(facts, moving_share=0.2, speed_px_s=8.0, moving_valid_share=left) for facts in one.facts
+    )
+    plan = plan_of(one.lights, fps=1, mode="rolling", dark_s=0.5)
+    found = of_motion.motion(plan, timing_of(frame_period_s=1.0, exposure_s=0.5), one, aligned=True)
+    assert "8 px from round to round" in found.found
+    assert found.grade == grade

@@ -10,6 +10,7 @@ from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import NOTICED
 from psvideo.report.judge.of_part_of_rows import MOST_LENT_PX, lent, round_s, seen_in_part, unknown_in_part
 from psvideo.report.judge.of_rows import is_blind
+from psvideo.report.judge.of_validity import HARDLY_VALID
 from psvideo.report.judge.of_what_moves import what_moves
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import LEAST_SHOWN_PX, Astray
@@ -44,7 +45,7 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
     speed, most_px = float(np.quantile(speeds, OFTEN)), max(speeds) * flash_s
     step_px = speed * flash_s
     if blind and (lent_px := speed * round_s(plan, timing)) > FAST_PX:
-        grave = lent_px > MOST_LENT_PX and share > FEW_MOVE and not aligned
+        grave = lent_px > MOST_LENT_PX and share > FEW_MOVE and (not aligned or _hardly_any_left(observed))
         found = lent(f"{_what_moves(share)} moves, by up to {step_px:.1f} px", timing, lent_px=lent_px, grave=grave)
         return replace(found, found=found.found + _unfrozen(plan, timing, observed, speed))
     if step_px <= FAST_PX:
@@ -68,6 +69,12 @@ def apart_in_round_px(plan: Plan, timing: Timing, observed: Observed) -> float:
     that is not known."""
     speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
     return float(np.quantile(speeds, OFTEN)) * _flash_s(plan, timing) * (len(plan.lights) - 1) if speeds else 0.0
+
+
+def _hardly_any_left(observed: Observed) -> bool:
+    """Return whether hardly any normal of what moves is trusted in a usual result."""
+    shares = [one.moving_valid_share for one in observed.facts if one.moving_valid_share is not None]
+    return bool(shares) and float(np.median(shares)) < HARDLY_VALID
 
 
 def _flash_s(plan: Plan, timing: Timing) -> float:
