@@ -20,10 +20,9 @@ from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.trust.thin_surface import ThinSurface
 from psvideo.solve.normals.trust.usual_errors import UsualErrors
-from psvideo.solve.sweeping import _averaged as averaged
 from psvideo.solve.sweeping import _costs as swept_costs
 from psvideo.solve.sweeping import swept
-from psvideo.solve.swept_odds import RATIOS
+from psvideo.solve.swept_odds import RATIOS, averaged
 from psvideo.solve.swept_odds import unsure_of as doubted
 
 
@@ -187,10 +186,12 @@ def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
     assert swept(near, rig.lights[:3], plates[:3]) is near, "and three not even where it is unsure"
 
 
-@pytest.mark.parametrize(("strength_off", "trusted"), [(0.0, 0.9), (0.02, 0.5)])
-def test_four_near_lights_do_not_vouch_for_a_wall_behind_the_plane(strength_off: float, trusted: float) -> None:
-    """On the plane its normals are off by some ten degrees. A subject that stands there is trusted, less of it where a
-    lamp is weaker than said, for then it may stand elsewhere."""
+@pytest.mark.parametrize(("strength_off", "trusted", "wall_deg"), [(0.0, 0.9, (0, 2)), (0.02, 0.5, (8, 30))])
+def test_four_near_lights_do_not_vouch_for_a_wall_behind_the_plane(
+    strength_off: float, trusted: float, wall_deg: tuple[float, float]
+) -> None:
+    """On the plane its normals are off by some twenty degrees, and there it stays where a lamp is weaker than said. A
+    subject that stands on the plane is trusted, less of it then, for it may stand elsewhere."""
     points, normals = surface(room)
     rig = ring_rig(8, 2)
     rig = replace(rig, lights=rig.lights[::2])
@@ -202,9 +203,25 @@ def test_four_near_lights_do_not_vouch_for_a_wall_behind_the_plane(strength_off:
     cols = np.arange(SIZE)
     wall = np.broadcast_to(np.abs(cols - MIDDLE) > 0.32 * SIZE, (SIZE, SIZE))
     subject = np.broadcast_to(np.abs(cols - MIDDLE) < 0.2 * SIZE, (SIZE, SIZE))
-    assert np.median(apart[wall]) > 8
+    assert wall_deg[0] < np.median(apart[wall]) < wall_deg[1]
     assert (found.valid & (apart > 10)).sum() < 0.03 * found.valid.sum(), "all of the wall was trusted"
     assert found.valid[subject].mean() > trusted
+
+
+def test_four_near_lights_put_a_ball_that_stands_off_the_plane_and_a_wall_behind_it() -> None:
+    """Both were integrated as one, and the median of all was put on the plane: the ball came too near."""
+    points, normals = surface(ball_before_wall)
+    rig = ring_rig(8, 2)
+    rig = replace(rig, lights=rig.lights[::2])
+    rng = np.random.default_rng(4)
+    plates = [plate + rng.normal(0, 0.0003, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    found = ps.solve_images(np.stack(plates), rig)
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    ball = points[..., 2] > -1.2 * FAR_M
+    assert np.median(apart[ball]) < 1.5, "3.5 before"
+    assert np.median(apart[~ball]) < 1.5, "17 before"
+    assert (apart > 10)[found.valid].mean() < 0.01
+    assert found.valid[ball].mean() > 0.6, "a quarter before"
 
 
 def test_one_clipped_channel_says_nothing_of_how_light_falls_off() -> None:

@@ -21,6 +21,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Distances, Surface
 from psvideo.solve.depth import Shaping, View, depth_of, view_of
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.swept_odds import averaged, unsure_of
 
 ROUGH_PX = 480
 """Depth for the lights' sake is integrated on a picture of at most this many pixels along its longer side."""
@@ -28,6 +29,14 @@ MOST_OFF = 0.12
 """Integrated depth that is off by more than this share of what the lights' falloff says is not believed."""
 OF_PART = 1.5
 """A distance is at most so many times as unsure as the median of its part."""
+FEW = 4
+"""Of so few near lights each leaves one number over for the distance: they put whole parts, and no single point."""
+TELLING = 3
+"""How unsure parts are is asked as if one of the four said nothing, and as if the rig were off: with all four, a lamp
+that is 2 % too strong put a seventh of a wall elsewhere and was sure of it; with half of them, a fifth of what moves on
+a belt was lost."""
+STAYED = 0.03
+"""What was put within this share of the plane is no more unsure than the plane, which was measured."""
 LEAST_COVERED = 0.5
 """Share of a rough pixel's normals that must be there."""
 
@@ -41,6 +50,7 @@ class NearSurface:
     torn: how far off the logarithm of distances may be because pixels may belong to another surface, (row, col) as
         what the ground is unsure of.
     distances: what the lights' falloff says of the whole picture; None where it was not asked, or the plane holds.
+    by_part: what it says under few lights, on the grid on which depth is integrated for the lights' sake.
     """
 
     ground: Ground
@@ -50,6 +60,7 @@ class NearSurface:
     apart: NDArray[np.bool_] | None = None
     torn: NDArray[np.float32] | None = None
     distances: Distances | None = None
+    by_part: Distances | None = None
 
     def at(self, number: int) -> "NearSurface":
         """Return where the surface is at the instant with this number."""
@@ -93,14 +104,34 @@ def solve_near(
     ground = near.ground
     surface = solve(light(ground))
     for _ in range(near.iterations):
-        depth_m = _rough_depth_m(near.shaping, surface if near.apart is None else _cut(surface, near.apart))
+        shown = surface if near.apart is None else _cut(surface, near.apart)
+        depth_m = _rough_depth_m(near.shaping, shown, near.by_part)
         if near.apart is not None:  # what was integrated across an edge that nobody saw is far from what was swept
             swept_m = near.ground.depth_m
             depth_m[np.abs(depth_m - swept_m) > MOST_OFF * swept_m] = 0
             ground = near.ground
+        if near.by_part is not None:
+            ground = replace(ground, unsure=_unsure_of_parts(near.ground.unsure, depth_m, near.by_part))
         ground = _held_by_parts(ground, depth_m, near).with_depth(depth_m)
         surface = solve(light(ground))
     return surface if near.distances is None else replace(surface, distances=near.distances)
+
+
+def _unsure_of_parts(
+    on_plane: NDArray[np.float32] | None, depth_m: NDArray[np.float32], by_part: Distances
+) -> NDArray[np.float32] | None:
+    """Return how unsure depth is where few lights put whole parts, on the grid of what was unsure ``on_plane``, which
+    stays where no depth was integrated or these lights tell nothing."""
+    if on_plane is None:
+        return None
+    rows, cols = (np.arange(many) * full // many for many, full in zip(on_plane.shape, depth_m.shape, strict=True))
+    here, told = depth_m[np.ix_(rows, cols)], by_part.weight > 0
+    told &= here > 0
+    logs = np.log(np.where(told, here, by_part.plane_m) / by_part.plane_m)
+    costs = averaged(by_part.costs, by_part.weight)
+    unsure = unsure_of(costs, TELLING, logs, told, rig_is_off=True)
+    unsure = np.where(np.abs(logs) < STAYED, np.minimum(unsure, on_plane), unsure)
+    return np.where(told, unsure, on_plane)
 
 
 def _held_by_parts(ground: Ground, depth_m: NDArray[np.float32], near: NearSurface) -> Ground:
@@ -127,12 +158,12 @@ def _cut(surface: Surface, apart: NDArray[np.bool_]) -> Surface:
     return Surface(normals=normals, albedo=shown.astype(np.float32), valid=shown)
 
 
-def _rough_depth_m(shaping: Shaping, surface: Surface) -> NDArray[np.float32]:
+def _rough_depth_m(shaping: Shaping, surface: Surface, by_part: Distances | None) -> NDArray[np.float32]:
     """Return a surface's depth, 0 where it has none, from normals averaged down to ROUGH_PX: lights see no detail."""
     rows, cols = surface.valid.shape
     step = max(int(np.ceil(max(rows, cols) / ROUGH_PX)), 1)
     if step == 1:
-        return depth_of(shaping, surface).depth
+        return depth_of(shaping, replace(surface, distances=by_part)).depth
     high, wide = -(-rows // step), -(-cols // step)
     margin = ((0, high * step - rows), (0, wide * step - cols), (0, 0))
     blocks = np.pad(surface.normals.astype(np.float32), margin).reshape(high, step, wide, step, 3)
@@ -140,7 +171,7 @@ def _rough_depth_m(shaping: Shaping, surface: Surface) -> NDArray[np.float32]:
     length = np.linalg.norm(mean, axis=-1)
     valid = length > LEAST_COVERED
     normals = np.where(valid[..., None], mean / np.maximum(length, LEAST_COVERED)[..., None], 0)
-    small = Surface(normals=normals, albedo=valid.astype(np.float32), valid=valid)
+    small = Surface(normals=normals, albedo=valid.astype(np.float32), valid=valid, distances=by_part)
     known_m = None if shaping.known_m is None else _every(shaping.known_m, step, (high, wide))
     depth = depth_of(replace(shaping, view=_smaller(shaping.view, step), known_m=known_m), small).depth
     size = (wide * step, high * step)
@@ -169,7 +200,7 @@ def _smaller(view: View, step: int) -> View:
 def near_trust(near: NearSurface) -> str:
     """Return in a whole sentence what a valid normal under near lights depends on."""
     middle = f"{-near.ground.middle_m[2]:.3g} m away in the picture's middle"
-    source = f"the rig's [surface] plane is, {middle}, or with five near lights and more where falloff puts it"
+    source = f"the rig's [surface] plane is, {middle}, or with four near lights and more where falloff puts it"
     source = source if near.shaping.known_m is None else f"the depth that was given says, {middle}"
     return (
         f"The lights are near, and the subject is taken to be where {source}. Were the lights' distances wrong by a "

@@ -4,7 +4,8 @@ Near lights give the brightness of a point by its normal, its albedo and its dis
 measured than normal and albedo, and a wrong distance leaves a residual. So distances from half to twice and a half the
 rig's plane are tried on a rough grid, as space is swept in stereo (R. Collins, "A space-sweep approach to true
 multi-image matching", CVPR 1996), and the best is taken: a wall behind the subject is found to be one. What stands on
-the plane stays there. Four lights only say where another distance would explain them as well or better.
+the plane stays there. Four lights only say where another distance would explain them as well or better, and how
+far away a whole part is whose relief was integrated.
 """
 
 from collections.abc import Sequence
@@ -18,15 +19,16 @@ from psvideo.model.irradiance.ground import Ground, spread
 from psvideo.model.rig import Light
 from psvideo.model.surface import Distances
 from psvideo.solve.falloff_costs import OWN_SHARE, Plates, around, falloff_costs, light_at
-from psvideo.solve.near_surface import NearSurface
+from psvideo.solve.near_surface import FEW, ROUGH_PX, NearSurface
 from psvideo.solve.normals.plate_noise import noise_of
 from psvideo.solve.pixels_of_points import for_pixels
-from psvideo.solve.swept_odds import AROUND, RATIOS, best_of, unsure_of
+from psvideo.solve.swept_odds import AROUND, RATIOS, averaged, best_of, unsure_of
 from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
 
-LIGHTS_FOR_SWEEPING, LIGHTS_FOR_DOUBT = 5, 4
+LIGHTS_FOR_SWEEPING, LIGHTS_FOR_DOUBT = FEW + 1, FEW
 """With four there is one number over for the distance, and nothing to see a highlight by: a rig that is off by 2 % puts
-a part of the subject elsewhere. They say how unsure the plane's distance is, and no other one."""
+a part of the subject elsewhere. They say how unsure a distance is, and put nothing but whole parts whose relief is
+integrated."""
 POINTS = 72
 """Points along the picture's longer side: distances are found for neighbourhoods."""
 EDGE = 4.0
@@ -56,12 +58,18 @@ def swept(
         return near
     few = sum(light.position_m is not None for light in lights) < LIGHTS_FOR_SWEEPING
     rows, cols = near.ground.depth_m.shape
-    fine = max(-(-max(rows, cols) // FINE_POINTS), 1)
+    fine = max(-(-max(rows, cols) // (ROUGH_PX if few else FINE_POINTS)), 1)
     each = max(-(-max(rows, cols) // (POINTS * fine)), 1)
     light, dark = light_at(plates, fine, seen), noise_of(plates).dark
     found = _distances(near.ground, lights, around(light, each), each * fine, noise=dark / each, few=few)
     if found is None:
         return near
+    if few:
+        near = replace(near, ground=replace(near.ground, unsure=found.unsure))
+        if found.own > OWN_SHARE:  # lamps that are off would put parts elsewhere
+            return near
+        rough_m = for_pixels(found.swept_m, each, light.shape[:2])
+        return replace(near, by_part=found.distances(rough_m, step=1, each=each))
     if found.on_plane:
         return replace(near, ground=replace(near.ground, unsure=found.unsure))
     closer, farther = (for_pixels(side, each * fine, (rows, cols))[::fine, ::fine] for side in sides_of(found.depth_m))
@@ -82,21 +90,23 @@ def swept(
     depth_m = for_pixels(drawn, fine, (rows, cols))
     apart = for_pixels(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
     shaping = replace(near.shaping, known_m=depth_m)
-    distances = Distances(
-        depth_m=drawn, step=fine, costs=found.costs, weight=found.weight, plane_m=found.plane_m, logs=np.log(RATIOS),
-        each=each,
-    )  # fmt: skip
     return replace(
-        near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart, torn=torn, distances=distances
+        near,
+        ground=ground.with_depth(depth_m),
+        shaping=shaping,
+        apart=apart,
+        torn=torn,
+        distances=found.distances(drawn, step=fine, each=each),
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweptPoints:
-    """What the sweep found at points (row, col): ``depth_m``, ``unsure``, how far off its logarithm may be, which
-    of them enough lights ``reached``, whether all of the surface stands on the plane, and by which share of it light is
-    off beside noise, ``own``; and of single points, how badly distances explain them, ``costs`` (ratio, row, col), what
-    that counts for, and the plane's distance."""
+    """What the sweep found at points (row, col): ``swept_m``, the distance of each, and ``depth_m``, which is that or
+    the plane's under few lights, ``unsure``, how far off its logarithm may be, which of them enough lights ``reached``,
+    whether all of the surface stands on the plane, and by which share of it light is off beside noise, ``own``; and of
+    single points, how badly distances explain them, ``costs`` (ratio, row, col), what that counts for, and the plane's
+    distance."""
 
     depth_m: NDArray[np.float32]
     unsure: NDArray[np.float32]
@@ -106,6 +116,20 @@ class SweptPoints:
     costs: NDArray[np.float32]
     weight: NDArray[np.float32]
     plane_m: NDArray[np.float32]
+    swept_m: NDArray[np.float32]
+
+    def distances(self, depth_m: NDArray[np.float32], *, step: int, each: int) -> Distances:
+        """Return what falloff says, with a ``depth_m`` of every ``step``-th row and column, of whose places every
+        ``each``-th is one of these points."""
+        return Distances(
+            depth_m=depth_m,
+            step=step,
+            costs=self.costs,
+            weight=self.weight,
+            plane_m=self.plane_m,
+            logs=np.log(RATIOS),
+            each=each,
+        )
 
 
 def _distances(
@@ -115,20 +139,28 @@ def _distances(
     under ``few`` lights; None where too few reach anything."""
     plane_m = ground.depth_m[::step, ::step].astype(np.float64)
     planes, sound, own = _explained(ground, lights, light, plane_m, step, noise=noise)
-    costs, reached = _averaged(planes, sound), sound > 0
+    costs, reached = averaged(planes, sound), sound > 0
     if not reached.any():
         return None
     found = np.where(reached, plane_m * np.exp(best_of(costs, len(lights), reached)), 0).astype(np.float32)
-    deep = plane_m.astype(np.float32) if few else np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
+    swept_m = np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
+    deep = plane_m.astype(np.float32) if few else swept_m
     unsure = unsure_of(costs, len(lights), np.log(deep / plane_m), reached, rig_is_off=own > OWN_SHARE)
     beside = cv2.dilate(unsure * reached, np.ones((AROUND, AROUND), np.uint8))
     unsure = np.where(reached, unsure, np.maximum(unsure, beside))  # in shadow it may be any surface around
     told = bool(np.median(unsure[reached]) < HARDLY)
-    on_plane = few or (told and _on_plane(deep / plane_m, reached, _jumps(deep)))
+    on_plane = told and _on_plane(deep / plane_m, reached, _jumps(deep))
     return SweptPoints(
-        depth_m=deep, unsure=unsure, reached=reached, on_plane=on_plane,
-        own=own, costs=planes.astype(np.float32), weight=sound.astype(np.float32), plane_m=plane_m.astype(np.float32),
-    )  # fmt: skip
+        depth_m=deep,
+        unsure=unsure,
+        reached=reached,
+        on_plane=on_plane,
+        own=own,
+        costs=planes.astype(np.float32),
+        weight=sound.astype(np.float32),
+        plane_m=plane_m.astype(np.float32),
+        swept_m=swept_m,
+    )
 
 
 def _jumps(depth_m: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -154,7 +186,7 @@ def _explained(
     bright = OWN_SHARE * light.max(axis=-1) > noise
     for own in OWN_SHARES.tolist():
         planes, sound = _costs(ground, lights, light, plane_m, step, noise=noise, own=own)
-        least = _averaged(planes, sound).min(axis=0)[bright & (sound > 0)]
+        least = averaged(planes, sound).min(axis=0)[bright & (sound > 0)]
         if least.size < LEAST_POINTS or np.median(least) < RIGHT:
             break
     return planes, sound, own
@@ -171,10 +203,3 @@ def _costs(
     planes = costs.reshape(len(RATIOS), *plane_m.shape)
     sound: NDArray[np.float64] = (planes[0] > 0) / (1 + EDGE * planes.min(axis=0) ** 2)
     return planes, sound
-
-
-def _averaged(planes: NDArray[np.float64], sound: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return costs (ratio, row, col) averaged over neighbours, by how ``sound`` these are."""
-    known = cv2.blur(sound, (AROUND, AROUND))
-    each = [np.asarray(cv2.blur(plane * sound, (AROUND, AROUND))) for plane in planes]
-    return np.stack(each) / np.maximum(known, 1e-9)

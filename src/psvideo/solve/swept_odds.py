@@ -1,5 +1,6 @@
 """How likely distances are by what they leave of near lights' light, and by where the rest of the picture stands."""
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +24,13 @@ explain a point that four lights reach, or that lies at an edge, nearly alike. W
 the most of the picture is."""
 SURE = 0.01
 """Better than to this share no distance is known."""
+
+
+def averaged(planes: NDArray[np.floating], sound: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return costs of single points (ratio, row, col) averaged over neighbours, by how ``sound`` these are."""
+    known = np.asarray(cv2.blur(sound, (AROUND, AROUND)), np.float64)
+    each = [np.asarray(cv2.blur(plane * sound, (AROUND, AROUND)), np.float64) for plane in planes]
+    return np.stack(each) / np.maximum(known, 1e-9)
 
 
 def best_of(costs: NDArray[np.float64], lights: int, reached: NDArray[np.bool_]) -> NDArray[np.float64]:
