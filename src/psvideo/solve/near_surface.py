@@ -127,6 +127,8 @@ def _unsure_of_parts(
     rows, cols = (np.arange(many) * full // many for many, full in zip(on_plane.shape, depth_m.shape, strict=True))
     here, told = depth_m[np.ix_(rows, cols)], by_part.weight > 0
     told &= here > 0
+    if not told.any():
+        return on_plane
     logs = np.log(np.where(told, here, by_part.plane_m) / by_part.plane_m)
     costs = averaged(by_part.costs, by_part.weight)
     unsure = unsure_of(costs, TELLING, logs, told, rig_is_off=True)
