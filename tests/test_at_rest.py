@@ -141,7 +141,14 @@ def test_a_run_that_begins_with_the_block_before_looks_and_trusts_the_same(make_
 
 def look(value: float) -> Doubt:
     plane = np.full((2, 3), value, np.float32)
-    return Doubt(doubt_deg=plane, usual_deg=2 * plane, lost_deg=plane, by_slope_deg=plane, shadows_lit=value / 10)
+    return Doubt(
+        doubt_deg=plane,
+        usual_deg=2 * plane,
+        lost_deg=plane,
+        by_slope_deg=plane,
+        shadows_lit=value / 10,
+        explained=value / 20,
+    )
 
 
 def test_doubts_are_the_mean_of_the_last_looks() -> None:

@@ -170,8 +170,12 @@ def alone_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
         misfit = counts * misfit_deg ** (1 + how.misfit_power)
         misfit /= misfit_deg + how.little_deg
         misfit -= signs.uneven * np.maximum(misfit - misfit_deg, 0)
+        by_cause = how.by_cause * np.asarray(signs.by_cause_deg)
+        known = np.sqrt((1 - signs.explained) * misfit**2 + signs.explained * by_cause**2)
+        misfit = known if signs.by_rig else np.minimum(known, misfit)
         both = np.hypot(np.hypot(misfit, how.indirect * signs.indirect_deg), signs.unchecked_deg)
         most_torn = how.torn_beside * both + how.torn_alone_deg + signs.unchecked_deg
+        torn_deg = (1 - signs.explained) * torn_deg
         limited = np.minimum(torn_deg, most_torn)
         more = np.maximum(signs.by_slope_deg**2 - misfit**2, 0)
         return np.asarray(both + how.torn * np.maximum(limited, signs.torn_share * torn_deg)), more
@@ -205,6 +209,9 @@ def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, mov
                     each,
                     unchecked_deg=unchecked,
                     by_model_deg=counted,
+                    by_cause_deg=np.asarray(unchecked, np.float32) * np.float32(0.7),
+                    explained=0.6 * unsaid,
+                    by_rig=unsaid > 0.5,
                     torn_share=share,
                     by_slope_deg=unchecked,
                     unsaid=unsaid,

@@ -46,10 +46,12 @@ class InPlace(NamedTuple):
 
 
 class Sought(NamedTuple):
-    """What kind of model is sought, and what stands in softness' place in it."""
+    """What kind of model is sought, and what stands in softness' place in it; of ``least_left`` albedos nothing is
+    expected to be explained."""
 
     kind: Kind = "shining"
     in_place: InPlace = InPlace()
+    least_left: float = 1e-4
 
 
 class ModelFollowed(NamedTuple):
@@ -125,7 +127,7 @@ def _model(points: SubjectPoints, g: Doubles, typical: float, sought: Sought) ->
         left = left_over(points, weights, parts)
         own, others = left[0], left[1:]
         rest = own - np.tensordot(model, others, axes=1)
-        spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), 1e-4)
+        spread = max(float(1.48 * median(np.abs(rest[points.counts > 0]))), sought.least_left)
         per = COUNTED / spread**2 / points.counts.sum()
         add_squares(weights, left, square, right)
         model = _bounded(per * square + np.diag(np.array(PRIOR) ** -2), per * right, sought)

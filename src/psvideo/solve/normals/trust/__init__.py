@@ -11,10 +11,11 @@ or pales where something shines (``by_colour``), shadows that pass for light (``
 lights, whose directions depend on the distance), ``moving_doubt`` (plates that do not match after alignment, beside
 what more than three lights say of them, ``witness``; ``agreeing`` takes off what these do not bear
 out; ``continued``, with ``continued_kernel``, takes normals on across narrow doubt),
-``few_checked`` (by how much a model of the subject would turn normals under four and five lights, where it leaves no
-more than ``by_other_rig``), and ``unchecked`` (what three lights leave of real surfaces, and show hardly anywhere;
-and how well few lights check each other; ``hidden_share``: how much of what is not matte lights hide altogether).
-Loops of the signs are in ``signs_kernel``. ``doubting`` says how much each counts, and makes one doubt of them; its
+``few_checked`` (what is left over may come of, under four to eight lights: a model of the subject, where it leaves
+no more than ``by_other_rig``, or such a rig; by how much that turns normals, ``rig_spread``), and ``unchecked`` (what
+three lights leave of real surfaces, and show hardly anywhere; and how well few lights check each other;
+``hidden_share``: how much of what is not matte lights hide altogether). Loops of the signs are in ``signs_kernel``.
+``doubting`` says how much each counts, and makes one doubt of them; its
 loop is ``doubting_kernel``. ``doubts`` are those of several looks at what stands still, and ``repeats`` shows by them
 how large noise is that detail does not show. ``usual_errors`` are those that are typical of a picture, for what is
 said of it as a whole.

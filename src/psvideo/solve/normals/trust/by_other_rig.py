@@ -26,12 +26,23 @@ class LeftOver(NamedTuple):
     evenly: float
 
 
-def left_by_other_rig(points: SubjectPoints, g: Doubles) -> LeftOver:
-    """Return which share of what a vector of each point's own leaves, ``g`` (point, 3), other lights would leave."""
+class OtherRig(NamedTuple):
+    """What a subject's points say of lights that are off: which share of what is ``left`` over other lights leave, and
+    of the changes of the vectors to them, in units of their strengths (light after light, x, y, z), how ``surely``
+    points tell them, (3 light, 3 light), one over their square, and ``told``, that times what they tell."""
+
+    left: LeftOver
+    surely: Doubles
+    told: Doubles
+
+
+def other_rig(points: SubjectPoints, g: Doubles) -> OtherRig:
+    """Return what other lights would leave of what a vector of each point's own leaves, ``g`` (point, 3)."""
     points = points.in_order()
     parts = _parts(points, g)
     weights, changes = points.counts, np.zeros(len(parts) - 1)
     left, square, right = parts, np.empty((len(changes),) * 2), np.empty(len(changes))
+    per = 0.0
     for turn in range(REWEIGHTED):
         left = left_over(points, weights, parts)
         spread = max(float(1.48 * median(np.abs(_rest(left, changes)[points.counts > 0]))), 1e-4)
@@ -44,7 +55,7 @@ def left_by_other_rig(points: SubjectPoints, g: Doubles) -> LeftOver:
     left = left_over(points, points.counts, parts)
     most = OUTLYING**2 * float((points.counts * left[0] ** 2).sum() / max(points.counts.sum(), 1))
     after, before = (points.counts * np.minimum(each**2, most) for each in (_rest(left, changes), left[0]))
-    return LeftOver(weighted, _share(after, before))
+    return OtherRig(LeftOver(weighted, _share(after, before)), per * square, per * right)
 
 
 def _parts(points: SubjectPoints, g: Doubles) -> Doubles:

@@ -37,6 +37,7 @@ class Doubting:
         there are more, where normals are as good as elsewhere. Under lights that can hardly be held against each other
         nothing else speaks, and they count without that limit (``unchecked.py``).
     by_model: the whole error is at least this share of the angle by which the subject's model would turn the normal.
+    by_cause: where it is known of what a misfit comes, so much of the angle by which that turns normals counts instead.
     length, length_beside, length_from_deg: how much it counts where albedo and residuals stand out together, and up to
         how many times of what all the rest is beyond some degrees: where nothing else speaks against a surface, edges
         of paint and shadows are as good as it is.
@@ -62,6 +63,7 @@ class Doubting:
     torn_beside: float = 0.5
     torn_alone_deg: float = 0.1
     by_model: float = 0.75
+    by_cause: float = 1.3
     length: float = 2.0
     length_beside: float = 4.0
     length_from_deg: float = 2.0
@@ -79,6 +81,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
 
     times = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
     counts = (times, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
+    counts = (*counts, signs.explained, float(signs.by_rig))
     planes = np.empty((kernel.SIGNS, *signs.misfit_deg.shape), np.float32)
     planes[kernel.MISFIT], planes[kernel.LIKELY_MISFIT] = signs.misfit_deg, signs.likely_misfit_deg
     planes[kernel.TORN], planes[kernel.LIKELY_TORN] = signs.torn_deg, signs.likely_torn_deg
@@ -86,6 +89,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     planes[kernel.AROUND], planes[kernel.UNCHECKED] = signs.indirect_deg, signs.unchecked_deg
     planes[kernel.LOST], planes[kernel.NOISE] = signs.lost_deg, signs.noise_deg
     planes[kernel.UNEVEN] = signs.uneven
+    planes[kernel.BY_CAUSE] = np.float32(how.by_cause) * signs.by_cause_deg
     planes[kernel.AT_LEAST] = np.float32(how.by_model) * signs.by_model_deg
     by_albedo_deg = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
     planes[kernel.BESIDE_MISFIT] = by_albedo_deg

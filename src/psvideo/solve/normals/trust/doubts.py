@@ -33,6 +33,7 @@ class Doubt:
     lost_deg: Floats
     by_slope_deg: Floats
     shadows_lit: float
+    explained: float
 
     @classmethod
     def of(cls, signs: Signs, how: Doubting) -> "Doubt":
@@ -45,6 +46,7 @@ class Doubt:
             lost_deg=signs.lost_deg,
             by_slope_deg=np.broadcast_to(np.float32(signs.by_slope_deg), nearly.shape),
             shadows_lit=signs.shadows_lit,
+            explained=signs.explained,
         )
 
 
@@ -92,4 +94,4 @@ def _mean(looks: Sequence[Doubt]) -> Doubt:
     mean: dict[str, Any] = {
         one.name: sum(getattr(look, one.name) for look in looks) / np.float32(len(looks)) for one in fields(Doubt)
     }
-    return Doubt(**mean | {"shadows_lit": float(mean["shadows_lit"])})
+    return Doubt(**mean | {name: float(mean[name]) for name in ("shadows_lit", "explained")})

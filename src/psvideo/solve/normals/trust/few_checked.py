@@ -1,11 +1,14 @@
-"""What a subject's reflectance says of normals under four and five lights, which are too few to solve by it.
+"""What is left over comes of, under four to eight lights: a reflectance of the subject, or lights that are off.
 
-There every model explains too much: a sheen passes for a turned normal, and a turned normal for a sheen. But by how
-much the model that fits all of the subject would turn them says how far they may be off.
+Four and five lights are too few to solve by a model of the reflectance: every model explains too much, a sheen passes
+for a turned normal, and a turned normal for a sheen. But by how much the model that fits all of the subject would turn
+normals says how far they may be off. And where a model, or a rig that is off, leaves next to nothing of what lights
+leave over, that is known to be the cause: normals are off by what it turns them (``rig_spread``), and not by what is
+typical of a residual as large.
 """
 
 from dataclasses import replace
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import cv2
 import numpy as np
@@ -25,10 +28,12 @@ from psvideo.solve.normals.robust.reflectance_fit import (
 )
 from psvideo.solve.normals.robust.reflectance_model import ROUGH, SOFT, Kind, Sought, alternated, explained_evenly
 from psvideo.solve.normals.robust.subject_points import LEAST_POINTS, SubjectPoints, sizes_of
-from psvideo.solve.normals.trust.by_other_rig import LeftOver, left_by_other_rig
+from psvideo.solve.normals.trust.by_other_rig import LeftOver, other_rig
+from psvideo.solve.normals.trust.rig_spread import turned_by_rig_deg
 
-FEWEST_LIGHTS = 4
-"""Three lights leave nothing that a model could explain."""
+FEWEST_LIGHTS, MOST_LIGHTS = 4, 8
+"""Three lights leave nothing that a model could explain; under more than the second number what each is off by averages
+out."""
 SHADOWED = 0.2
 """Below this share of the point's mean, light may come from neighbouring surfaces."""
 LEAST_EVENLY = 0.05
@@ -47,18 +52,37 @@ though it explains two thirds: lights nearly on a ring can hardly tell softness,
 of it."""
 TURNS = 2
 """How often model and normals follow each other: four times cost twice as much and say the same."""
+LEAST_LEFT = 0.01
+"""No surface follows a model better than to this share of its albedo: fitted to less, models turned normals the more the
+less noise there was."""
 AROUND = 0.07
 """Angles are means around a point, Gaussian of this standard deviation, as a share of the subject's size."""
+CLEAR, CLEARLY_LEFT, MOST_NOISE = 0.12, 3.0, 0.5
+"""What leaves up to this share where all measurements count alike is wholly the cause of what is left over, and none
+where it leaves so many times as much; beside noise, which is known no better than to a fifth and taken off up to the
+third."""
 FAR = 1e-3
 """Where points are farther than that, the mean of all of them counts, as this much of one."""
 
 
-def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) -> Floats | None:
-    """Return by how many degrees the subject's model would turn the normals around every point of every ``step``-th row
-    and column, of which ``thin`` is the surface, (row, col); None where the lights are too many or too few, or the
-    points, or normals follow such a model already. ``known``: (row, col), the points that speak for the subject."""
+class Turned(NamedTuple):
+    """What models of the subject and other lights say, at points or around those of a grid: by how many degrees a model
+    would turn the normals, ``by_model_deg``, though it need not be right; and how far what is left over is
+    ``explained``, 0 to 1, by what turns normals ``by_cause_deg``: by lights that are off if ``by_rig``."""
+
+    by_model_deg: Floats | Doubles
+    explained: float
+    by_cause_deg: Floats | Doubles
+    by_rig: bool
+
+
+def turned_by_causes(thin: Surface, step: int, one: Evidence, known: Mask, *, of_noise: float = 0.0) -> Turned | None:
+    """Return what turns the normals around every point of every ``step``-th row and column, of which ``thin`` is the
+    surface, (row, col); None where the lights are too many or too few, or the points, or normals follow a model
+    already. ``known``: (row, col), the points that speak for the subject; noise makes the share ``of_noise`` of the
+    squares of what is left over."""
     solved_by_it = thin.misfit is not None and thin.misfit.reflectance is not None
-    if solved_by_it or not FEWEST_LIGHTS <= len(one.plates) < FOR_SHINE:
+    if solved_by_it or not FEWEST_LIGHTS <= len(one.plates) <= MOST_LIGHTS:
         return None
     rows = np.flatnonzero(known.any(axis=1))
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, ROWS).astype(np.intp))] if len(rows) else rows
@@ -77,29 +101,56 @@ def turned_by_model_deg(thin: Surface, step: int, one: Evidence, known: Mask) ->
     some = sizes > 0
     if np.count_nonzero(some) < LEAST_POINTS:
         return None
-    angles = model_turns_deg(points.only(some), points.normals[some] * sizes[some, None])
-    return _around(known.shape, (here[0][some], here[1][some]), angles, int(known.sum()))
+    turned = causes(points.only(some), points.normals[some] * sizes[some, None], of_noise=of_noise)
+    angles = np.stack([turned.by_model_deg, turned.by_cause_deg], axis=-1)
+    around = _around(known.shape, (here[0][some], here[1][some]), angles, int(known.sum()))
+    return Turned(around[..., 0], turned.explained, around[..., 1], turned.by_rig)
 
 
-def model_turns_deg(points: SubjectPoints, g: Doubles) -> Doubles:
-    """Return by how many degrees a model of all points would turn their normals, given times albedo (point, 3): one
-    that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts nothing, one
-    that explains twice as much wholly: what comes and goes by its noise would flicker. Nor does one count where lights
-    that stand a little otherwise would explain far more."""
-    sizes, most, others = np.linalg.norm(g, axis=1), np.zeros(len(g)), LeftOver(1.0, 1.0)
-    typical, by_rig = median(sizes), left_by_other_rig(points, g)
-    for kind in get_args(Kind):
-        one = alternated(points, g, typical, Sought(kind), turns=TURNS, least=LEAST_EXPLAINED)
+def causes(points: SubjectPoints, g: Doubles, *, of_noise: float = 0.0) -> Turned:
+    """Return what turns the normals of points, given times albedo (point, 3); noise makes the share ``of_noise`` of the
+    squares of what is left over.
+
+    By a model: one that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts
+    nothing, one that explains twice as much wholly: what comes and goes by its noise would flicker. Nor does one count
+    where lights that stand a little otherwise would explain far more. Of so many lights that normals are solved by
+    models, none is looked for.
+
+    By a cause: a model or lights that are off, of those that leave next to nothing the one that turns them most.
+    """
+    sizes, most = np.linalg.norm(g, axis=1), np.zeros(len(g))
+    typical, rig = median(sizes), other_rig(points, g)
+    by_rig = explained = _clearly(rig.left, of_noise)
+    by_cause = np.zeros(len(g))
+    if explained:
+        by_cause = explained * turned_by_rig_deg(points, g / sizes[:, None], rig)
+    others = LeftOver(1.0, 1.0)
+    for kind in get_args(Kind) if len(points.measured) < FOR_SHINE else ():
+        one = alternated(points, g, typical, Sought(kind, least_left=LEAST_LEFT), turns=TURNS, least=LEAST_EXPLAINED)
         evenly = explained_evenly(points, g, typical, one.model)
         left = LeftOver(1 - one.explained, 1 - evenly)
-        holds = _beyond(evenly, LEAST_EVENLY) * beside_rig(left, by_rig)
+        holds = _beyond(evenly, LEAST_EVENLY) * beside_rig(left, rig.left)
         holds *= _beyond(float(one.model[ROUGH]), LEAST_ROUGH) if kind == "rough" else 1.0
         if kind == "soft":  # the last: it must leave much less than the others, or lights that are off look like it
             holds *= _beyond(float(one.model[SOFT]), LEAST_SOFT) * much_less_left(left, others)
         others = LeftOver(min(left.weighted, others.weighted), min(left.evenly, others.evenly))
         cosines = (one.g * g).sum(axis=1) / np.maximum(np.linalg.norm(one.g, axis=1) * sizes, 1e-12)
-        most = np.maximum(most, holds * np.degrees(np.arccos(np.clip(cosines, -1, 1))))
-    return most
+        turned = np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+        most = np.maximum(most, holds * turned)
+        clearly = holds * _clearly(left, of_noise)
+        explained, by_cause = max(explained, clearly), np.maximum(by_cause, clearly * turned)
+    return Turned(most, explained, by_cause / max(explained, 1e-9), by_rig == explained > 0)
+
+
+def _clearly(left: LeftOver, of_noise: float) -> float:
+    """Return how far something that leaves so much is the cause of what is left over beside noise, 0 to 1.
+
+    >>> _clearly(LeftOver(0.01, 0.1), 0.0), _clearly(LeftOver(0.01, 0.2), 0.1), _clearly(LeftOver(0.01, 0.36), 0.0)
+    (1.0, 1.0, 0.0)
+    """
+    most_noise = min(of_noise, MOST_NOISE)
+    times = (max(left.weighted, left.evenly) - most_noise) / (1 - most_noise) / CLEAR
+    return min(max((CLEARLY_LEFT - times) / (CLEARLY_LEFT - 1), 0.0), 1.0)
 
 
 def much_less_left(soft: LeftOver, others: LeftOver) -> float:
@@ -134,12 +185,12 @@ def _beyond(value: float, least: float) -> float:
 def _around(
     shape: tuple[int, ...], at: tuple[NDArray[np.intp], NDArray[np.intp]], angles_deg: Doubles, points: int
 ) -> Floats:
-    """Return the mean of angles at rows and columns around every point of a grid."""
-    planes = np.zeros((*shape, 2), np.float32)
-    planes[at] = np.stack([angles_deg, np.ones(len(angles_deg))], axis=-1)
+    """Return the means of angles (point, which) at rows and columns around every point of a grid, (row, col, which)."""
+    planes = np.zeros((*shape, angles_deg.shape[1] + 1), np.float32)
+    planes[at] = np.concatenate([angles_deg, np.ones((len(angles_deg), 1))], axis=-1)
     width = int(AROUND * np.sqrt(6 * points)) // 2 * 2 + 1  # twice over squares this wide is nearly Gaussian
     for _ in range(2):
         planes = np.asarray(cv2.blur(planes, (width, width), borderType=cv2.BORDER_CONSTANT), np.float32)
     planes *= np.float32(width**2)
-    common = np.float32(FAR * angles_deg.mean())
-    return np.asarray((planes[..., 0] + common) / (planes[..., 1] + np.float32(FAR)), np.float32)
+    common = (FAR * angles_deg.mean(axis=0)).astype(np.float32)
+    return np.asarray((planes[..., :-1] + common) / (planes[..., -1:] + np.float32(FAR)), np.float32)

@@ -79,7 +79,7 @@ def judged(
     if len(one.plates) > ALL_EXPLAINED and points.known.any():
         by_noise_deg = np.hypot(points.noise_deg, shown.lost_deg)
         typical = UsualErrors.of(points, errors, by_noise_deg, near, most_deg=how.most_error_deg)
-        likely_deg = typical.likely_deg(one.lit, plain=misfit is None)
+        likely_deg = typical.likely_deg(one.lit, plain=misfit is None, explained=shown.explained)
         misfit = None if misfit is None else typical.misfit(misfit)
     doubt = shown.doubt_deg if moving is None else moving.beside(shown.doubt_deg)
     turned = None if moving is None or one.arc_deg is None else _at_points(one.arc_deg, points.known.shape)

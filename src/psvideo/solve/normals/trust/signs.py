@@ -23,7 +23,7 @@ from psvideo.solve.normals.trust.added_light import Added, added_unseen, modelle
 from psvideo.solve.normals.trust.by_colour import by_colour_deg
 from psvideo.solve.normals.trust.by_length import by_length_deg
 from psvideo.solve.normals.trust.by_slope import by_slope_deg
-from psvideo.solve.normals.trust.few_checked import turned_by_model_deg
+from psvideo.solve.normals.trust.few_checked import turned_by_causes
 from psvideo.solve.normals.trust.hidden_share import hidden_of
 from psvideo.solve.normals.trust.indirect import not_of_motion
 from psvideo.solve.normals.trust.lit_shadows import LitShadows, shadows_of
@@ -44,7 +44,7 @@ MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
 """Samples this far apart are compared: a codec's errors are alike in nearer ones. The misfit of surfaces changes by
 up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
-WHOLE = ("hidden", "plain", "shadows_lit", "unsaid")
+WHOLE = ("hidden", "plain", "shadows_lit", "unsaid", "explained", "by_rig")
 """What ``Signs`` says of all points at once."""
 ONE_LEFT = ALL_EXPLAINED + 1
 """This many lights leave one number over, and albedo says more of how far normals are off. (Under five and six two and
@@ -66,12 +66,13 @@ class Signs:
     surfaces, though nothing shows; it counts in errors, and not in what is trusted. ``torn_share``: by how much
     of themselves torn normals count whatever else shows, under lights that can hardly be held against each other.
     ``by_model_deg``: by how much the model of the subject's reflectance would turn the normals under four and five
-    lights (``few_checked.py``). ``by_slope_deg``: by how much normals are turned as albedo that goes with the slope
-    shows it, under lights that can hardly be held against each other (``by_slope.py``); ``by_colour_deg`` as its
-    colour does (``by_colour.py``). ``unsaid``: how far the one residual of four such lights does not say it, 0 to 1,
-    where albedo does; ``in_light``: where it does, 0 to 1, since all lamps reach or shadows are black.
-    ``shadows_deg``: by how much they may be where a shadow that is lit from around passes for light
-    (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1.
+    lights (``few_checked.py``); ``explained``: how far the misfit is known to come of such a model or of lights that
+    are off (``by_rig``), 0 to 1, and ``by_cause_deg`` by how much that turns normals. ``by_slope_deg``: by how much
+    normals are turned as albedo that goes with the slope shows it, under lights that can hardly be held against each
+    other (``by_slope.py``); ``by_colour_deg`` as its colour does (``by_colour.py``). ``unsaid``: how far the one
+    residual of four such lights does not say it, 0 to 1, where albedo does; ``in_light``: where it does, 0 to 1, since
+    all lamps reach or shadows are black. ``shadows_deg``: by how much they may be where a shadow that is lit from
+    around passes for light (``lit_shadows.py``), ``shadows_lit`` whether the subject's shadows are so lit, 0 to 1.
     ``by_length_deg``: by how much albedo and residuals stand out together beyond what is usual around a point
     (``by_length.py``)."""
 
@@ -87,6 +88,9 @@ class Signs:
     uneven: Floats | float = 0.0
     unchecked_deg: Floats | float = 0.0
     by_model_deg: Floats | float = 0.0
+    by_cause_deg: Floats | float = 0.0
+    explained: float = 0.0
+    by_rig: bool = False
     torn_share: Floats | float = 0.0
     by_slope_deg: Floats | float = 0.0
     by_colour_deg: Floats | float = 0.0
@@ -129,7 +133,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         unseen, added = unseen_share(one.lit), added_unseen(one.lit)
     turned_by_it_deg = modelled_deg(points, one, still) if added else 0.0
     shadows = shadows_of(points, one.lit, still) if unseen else LitShadows(np.zeros_like(noise), 0.0)
-    by_model = turned_by_model_deg(points.surface, points.step, one, still)
+    causes = turned_by_causes(points.surface, points.step, one, still, of_noise=_of_noise(points))
     slope = None
     if unseen or added:
         slope = by_slope_deg(points, one.lit, still, unseen=unseen, added=added, modelled_deg=turned_by_it_deg)
@@ -145,7 +149,10 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         lost_deg=points.noise_deg * np.sqrt(wider - 1),
         hidden=hidden_of(one.lit, plain=plain, beside_slope=not one.moved),
         plain=plain,
-        by_model_deg=0.0 if by_model is None else by_model,
+        by_model_deg=0.0 if causes is None else causes.by_model_deg,
+        by_cause_deg=0.0 if causes is None else causes.by_cause_deg,
+        explained=0.0 if causes is None else causes.explained,
+        by_rig=causes is not None and causes.by_rig,
         torn_share=torn_share(points, one.lit),
         by_slope_deg=0.0 if slope is None else slope,
         by_colour_deg=np.float32(unseen) * by_colour_deg(points, one.lit, still) if unseen else 0.0,
@@ -170,6 +177,12 @@ def _beyond_noise(points: ThinSurface, wider: Floats) -> tuple[Floats, Floats, F
         line(shown),
     )  # fmt: skip
     return squares, noise, shown
+
+
+def _of_noise(points: ThinSurface) -> float:
+    """Return which share of the squares of what residuals predict noise makes."""
+    noise, whole = (float((each[points.known] ** 2).sum()) for each in (points.fit_of_noise_deg, points.fit_deg))
+    return noise / max(whole, 1e-30)
 
 
 def _uneven(misfit_deg: Floats, changing_deg: Floats) -> Floats:

@@ -52,10 +52,12 @@ class UsualErrors(NamedTuple):
         """What is left without noise."""
         return float(np.sqrt(max(self.whole_deg**2 - self.by_noise_deg**2, 0.0)))
 
-    def likely_deg(self, lit: Illumination, *, plain: bool) -> float:
+    def likely_deg(self, lit: Illumination, *, plain: bool, explained: float) -> float:
         """Return how far off normals are likely to be beyond noise; of ``plain`` least squares, whose constant was
-        fitted to four lights as they stand, that is what errors say."""
-        return self.beyond_noise_deg * (1.0 if plain else beside_fitted(lit))
+        fitted to four lights as they stand, that is what errors say, and so it is as far as it is known of what they
+        come, ``explained``."""
+        unknown = 1.0 if plain else beside_fitted(lit)
+        return self.beyond_noise_deg * (unknown + explained * (1 - unknown))
 
     def misfit(self, found: Misfit) -> Misfit:
         """Return a misfit that says what is typical of the points."""
