@@ -53,8 +53,8 @@ of it."""
 TURNS = 2
 """How often model and normals follow each other: four times cost twice as much and say the same."""
 LEAST_LEFT = 0.01
-"""No surface follows a model better than to this share of its albedo: fitted to less, models turned normals the more the
-less noise there was."""
+"""No surface follows a model better than to this share of its albedo: fitted to less, models turned normals the more,
+the less noise there was."""
 AROUND = 0.07
 """Angles are means around a point, Gaussian of this standard deviation, as a share of the subject's size."""
 CLEAR, CLEARLY_LEFT, MOST_NOISE = 0.12, 3.0, 0.5
