@@ -81,7 +81,6 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
 
     times = how.misfit_deg * (how.plain if signs.plain else 1.0) * signs.hidden**how.few_power
     counts = (times, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
-    counts = (*counts, signs.explained, float(signs.by_rig))
     planes = np.empty((kernel.SIGNS, *signs.misfit_deg.shape), np.float32)
     planes[kernel.MISFIT], planes[kernel.LIKELY_MISFIT] = signs.misfit_deg, signs.likely_misfit_deg
     planes[kernel.TORN], planes[kernel.LIKELY_TORN] = signs.torn_deg, signs.likely_torn_deg
@@ -93,7 +92,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     planes[kernel.AT_LEAST] = np.float32(how.by_model) * signs.by_model_deg
     by_albedo_deg = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
     planes[kernel.BESIDE_MISFIT] = by_albedo_deg
-    factors = kernel.Factors(*np.array(counts, np.float32))
+    factors = kernel.Factors(*np.array((*counts, signs.explained, signs.by_rig), np.float32))
     doubt = _of_planes(planes, factors, signs, how)
     if not signs.unsaid:
         return doubt

@@ -70,9 +70,9 @@ class Turned(NamedTuple):
     would turn the normals, ``by_model_deg``, though it need not be right; and how far what is left over is
     ``explained``, 0 to 1, by what turns normals ``by_cause_deg``: by lights that are off if ``by_rig``."""
 
-    by_model_deg: Floats | Doubles
+    by_model_deg: Floats
     explained: float
-    by_cause_deg: Floats | Doubles
+    by_cause_deg: Floats
     by_rig: bool
 
 
@@ -102,7 +102,7 @@ def turned_by_causes(thin: Surface, step: int, one: Evidence, known: Mask, *, of
     if np.count_nonzero(some) < LEAST_POINTS:
         return None
     turned = causes(points.only(some), points.normals[some] * sizes[some, None], of_noise=of_noise)
-    angles = np.stack([turned.by_model_deg, turned.by_cause_deg], axis=-1)
+    angles = np.stack([turned.by_model_deg, turned.by_cause_deg], axis=-1).astype(np.float64)
     around = _around(known.shape, (here[0][some], here[1][some]), angles, int(known.sum()))
     return Turned(around[..., 0], turned.explained, around[..., 1], turned.by_rig)
 
@@ -139,7 +139,8 @@ def causes(points: SubjectPoints, g: Doubles, *, of_noise: float = 0.0) -> Turne
         most = np.maximum(most, holds * turned)
         clearly = holds * _clearly(left, of_noise)
         explained, by_cause = max(explained, clearly), np.maximum(by_cause, clearly * turned)
-    return Turned(most, explained, by_cause / max(explained, 1e-9), by_rig == explained > 0)
+    by_cause /= max(explained, 1e-9)
+    return Turned(most.astype(np.float32), explained, by_cause.astype(np.float32), by_rig == explained > 0)
 
 
 def _clearly(left: LeftOver, of_noise: float) -> float:
