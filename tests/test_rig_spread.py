@@ -5,17 +5,24 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from angles import angles_deg
+from bench.predicted import shapes, shot
 from numpy.typing import NDArray
 from ring_and_ball import ring
 
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.lit_plates import LitPlates
 from psvideo.solve.normals.robust.subject_points import SubjectPoints
+from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust import few_checked
 from psvideo.solve.normals.trust.by_other_rig import other_rig
-from psvideo.solve.normals.trust.rig_spread import turned_by_rig_deg
+from psvideo.solve.normals.trust.judging import looked_at
+from psvideo.solve.normals.trust.rig_spread import _squares_turned, turned_by_rig_deg
+from psvideo.solve.normals.trust.usual_errors import UsualErrors
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
 NOISE = 0.001
+SHAPES = {name: (normals, inside) for name, normals, inside in shapes()}
 
 
 class Seen(NamedTuple):
@@ -121,3 +128,26 @@ def test_noise_is_not_left_by_a_cause() -> None:
     assert 0.12 < left < 0.6
     assert few_checked.causes(one.points, one.g, of_noise=0.9 * left).explained > 0.9
     assert few_checked.causes(one.points, one.g).explained < 0.9
+
+
+def test_lights_that_are_all_stronger_by_a_share_turn_nothing() -> None:
+    one = seen(ring(5, 40), ring(5, 40), np.random.default_rng(7))
+    stronger = 0.1 * ring(5, 40).reshape(-1)
+    assert _squares_turned(one.points, one.points.normals, np.outer(stronger, stronger)[None]).max() < 1e-12
+
+
+def test_what_is_known_to_be_the_cause_counts_wholly_in_what_is_said_of_a_picture() -> None:
+    lit = Illumination(directions=ring(5, 40), intensities=np.ones((5, 1)))
+    usual = UsualErrors(whole_deg=4.0, by_noise_deg=0.0, unknown_share=0.0)
+    assert usual.likely_deg(lit, plain=False, explained=1.0) == pytest.approx(4)
+    assert usual.likely_deg(lit, plain=False, explained=0.0) < 2.5
+
+
+def test_beside_much_noise_a_rig_that_is_off_by_a_degree_is_still_the_cause() -> None:
+    normals, inside = SHAPES["bumps"]
+    claimed = ring(5, 40) + np.radians(1.0) * np.random.default_rng(3).normal(size=(5, 3))
+    claimed /= np.linalg.norm(claimed, axis=1, keepdims=True)
+    case = shot(normals, inside, ring(5, 40), noise=0.01)
+    lit = Illumination(directions=claimed, intensities=np.ones((5, 3)))
+    surface, one, noise = Solving().measured(LitPlates(case.plates, lit, mask=inside))
+    assert looked_at(surface, one, noise)[1].explained > 0.5
