@@ -117,6 +117,7 @@ def gather(
         schedule=scheduled(take, timing, aligning, start_number=start_number),
         whites=None if part is None else part.whites,
         put_by=None if take.kept is None else take.kept.passing_codes,
+        coded=take.clip.is_movie,
     )
     rounds = _apart(rounds, take)
     return with_open_shutter(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds

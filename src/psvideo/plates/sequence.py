@@ -21,6 +21,9 @@ AMBIENT = "ambient"
 """What stands for a light where a dark slot showed the ambient light."""
 POOLED_ROUNDS = 16
 """Rounds whose results are pooled where nothing moves: a step is then a 16th of what noise makes of one."""
+VOTING_BLOCKS = 3
+"""So many times as many rounds vote on a pixel's class: near a limit twice as many rounds let a third as many pixels
+change it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +51,9 @@ class Round:
         Of each light what an open shutter shows about the instant; empty where none is wanted.
     doubtful
         (row, col), True where plates depend on a colour of the surface that was guessed; None where none do.
+    calm
+        On a coarse grid over the picture, (row, col), True where nothing changed by more than a codec leaves, and
+        nothing beside it; None where no codec makes plates differ.
     """
 
     number: int
@@ -58,14 +64,19 @@ class Round:
     unsure: NDArray[np.float32] | None = None
     open_plates: tuple[LightPlate, ...] = ()
     doubtful: NDArray[np.bool_] | None = None
+    calm: NDArray[np.bool_] | None = None
 
     @property
     def moved(self) -> NDArray[np.bool_] | None:
-        """On a coarse grid over the picture, (row, col), True where plates were moved, or no motion explains them; None
-        where nothing moved."""
+        """On a coarse grid over the picture, (row, col), True where plates were moved, or no motion explains them, for
+        more than what a codec leaves; None where nothing moved."""
         if self.motion is None or self.unsure is None:
             return None
-        return np.asarray(self.motion.moves | (self.unsure > 0).any(axis=0))
+        moved = self.motion.moves | (self.unsure > 0).any(axis=0)
+        if self.calm is None:
+            return np.asarray(moved)
+        high, wide = (np.arange(size) * each // size for size, each in zip(moved.shape, self.calm.shape, strict=True))
+        return np.asarray(moved & ~self.calm[np.ix_(high, wide)])
 
     @property
     def time_s(self) -> float:

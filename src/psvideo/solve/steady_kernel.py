@@ -23,13 +23,9 @@ from psvideo.solve.steady_votes import (
     FORGETS,
     HAS_BEFORE,
     PER,
-    REACHED,
-    REACHED_BEFORE,
     ROUNDS,
     SOURCE,
     TAKES,
-    TRUSTED,
-    TRUSTED_BEFORE,
     VALID,
     VALUES,
     WEIGHT,
@@ -39,6 +35,7 @@ from psvideo.solve.steady_votes import (
     begin_votes,
     decide,
     forget_votes,
+    turn_votes,
 )  # fmt: skip
 
 SEGMENT = 64
@@ -107,9 +104,8 @@ def turn_block(pool: Pool, first: int, last: int, block: int) -> None:
     for slot in range(first, last):
         for i in range(SEGMENT):
             left = block - int(votes[slot, ROUNDS, i])  # more than 0 where the pixel changed in this block
-            for now, then in ((REACHED, REACHED_BEFORE), (TRUSTED, TRUSTED_BEFORE)):
-                votes[slot, then, i] = int(votes[slot, now, i]) + left * int(votes[slot, then, i]) // block
             count = int(votes[slot, VALUES, i])
+            turn_votes(votes[slot], i, left, block)
             left = left if votes[slot, HAS_BEFORE, i] else 0
             one, weight = ONE / np.float32(max(count + left, 1)), np.float32(left)
             for plane in range(values.shape[1]):
@@ -117,8 +113,6 @@ def turn_block(pool: Pool, first: int, last: int, block: int) -> None:
                 before[slot, plane, i] = encoded(total * one, before)
                 values[slot, plane, i] = 0
             votes[slot, HAS_BEFORE, i] = count + left > 0
-            for plane in (REACHED, TRUSTED, ROUNDS, VALUES):
-                votes[slot, plane, i] = 0
 
 
 @FUSED.kept

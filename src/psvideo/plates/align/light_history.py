@@ -18,17 +18,21 @@ since (``_stands_on``).
 from collections import deque
 from dataclasses import dataclass, field, replace
 
+import cv2
 import numpy as np
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.velocity.brightness import evened
-from psvideo.plates.align.velocity.flow import Sketch, changed, sketch_of, white_of
+from psvideo.plates.align.velocity.flow import Changes, Sketch, changes, sketch_of, white_of
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.align.velocity.own_flow import OwnFlows
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS
+
+BESIDE = 9
+"""What moves is found up to half as many blocks beside those that changed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +94,7 @@ class Held:
     its middle. ``motion`` says by light and round what was compared with the round before, and where it had moved;
     ``drift`` where it had since the ``first`` sketch of a light in a block of rounds that are pooled. ``put_by`` takes
     codes of packed plates. ``own_flows`` are those of the plates around the last instant of which nothing is measured.
-    ``lamps`` is how the lights shine, None where that is not known.
+    ``lamps`` is how the lights shine, None where that is not known. ``coded``: plates are made of a movie's frames.
     """
 
     lights: tuple[str, ...]
@@ -101,10 +105,11 @@ class Held:
     whites: dict[str, float] = field(default_factory=dict)
     put_by: PutBy | None = None
     lamps: Lamps | None = None
+    coded: bool = False
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
     waiting: deque[DueInstant] = field(default_factory=deque)
     ambient: dict[int, LightPlate] = field(default_factory=dict)
-    motion: dict[tuple[str, int], Flags] = field(default_factory=dict)
+    motion: dict[tuple[str, int], Changes] = field(default_factory=dict)
     drift: dict[tuple[str, int], Flags] = field(default_factory=dict)
     first: dict[str, Sketch] = field(default_factory=dict)
     own_flows: OwnFlows = field(default_factory=OwnFlows)
@@ -123,7 +128,7 @@ class Held:
         if self.sketched:
             if plate.light not in self.whites:
                 self.whites[plate.light] = white_of(plate)
-            sketch = sketch_of(plate, white=self.whites[plate.light])
+            sketch = sketch_of(plate, white=self.whites[plate.light], coded=self.coded)
             self._look_for_drift(plate.light, sketch)
         shot = Shot(round=plate.number, time_s=plate.time_s, sketch=sketch, plate=plate)
         self.shots.setdefault(plate.light, {})[plate.number] = shot
@@ -142,7 +147,7 @@ class Held:
         if sketch.number % POOLED_ROUNDS == 0:
             self.first[light] = sketch
         elif (first := self.first.get(light)) is not None and 1 < sketch.number - first.number < POOLED_ROUNDS:
-            self.drift[light, sketch.number] = changed(first, evened(first, sketch))
+            self.drift[light, sketch.number] = changes(first, evened(first, sketch)).stirred
 
     def around(self, light: str, instant: DueInstant) -> Around | None:
         """Return what a light's plate at an instant is made from; None where that is still to come."""
@@ -201,19 +206,31 @@ class Held:
             before, own = shots.get(round_number - 1), shots.get(round_number)
             if before is None or own is None or before.sketch is None or own.sketch is None:
                 return None
-            self.motion[key] = changed(before.sketch, evened(before.sketch, own.sketch))
-        return bool(self.motion[key].any())
+            self.motion[key] = changes(before.sketch, evened(before.sketch, own.sketch))
+        return bool(self.motion[key].moved.any())
 
     def stood(self, number: int) -> Flags | None:
         """Return where nothing changed since the round before, nor since the first of its block, under any light, nor
         until the next round as far as that was looked at; None where any light was not compared."""
         if any(self.moved_since(light, number) is None for light in self.lights):
             return None
-        changes = [self.motion[light, number] for light in self.lights]
-        changes += [self.motion[light, number + 1] for light in self.lights if (light, number + 1) in self.motion]
-        changes += [self.drift[light, number] for light in self.lights if (light, number) in self.drift]
-        moved = np.any(changes, axis=0)
+        moved = np.any(self._stirred(number), axis=0)
         return ~moved if moved.any() else np.ones((1, 1), np.bool_)
+
+    def calm(self, number: int) -> Flags | None:
+        """Return where nothing changed in a round by more than a codec leaves, nor beside it, as far as any light was
+        compared; None where no codec makes plates differ."""
+        stirred = self._stirred(number) if self.coded else []
+        if not stirred:
+            return None
+        return cv2.dilate(np.any(stirred, axis=0).astype(np.uint8), np.ones((BESIDE, BESIDE), np.uint8)) == 0
+
+    def _stirred(self, number: int) -> list[Flags]:
+        """Return what was stirred since the round before, until the next one, and since the first of the block, under
+        every light of which that is known."""
+        seen = [self.motion.get((light, other)) for light in self.lights for other in (number, number + 1)]
+        drifts = [self.drift[light, number] for light in self.lights if (light, number) in self.drift]
+        return [one.stirred for one in seen if one is not None] + drifts
 
     def _stood(self, instant: DueInstant) -> bool:
         """Return whether nothing moved in an instant's round: no light shows motion since the round before, and all
@@ -259,7 +276,7 @@ class Held:
             del self.ambient[number]
         for seen in (self.motion, self.drift):
             for key in [key for key in seen if key[1] < oldest]:
-                del seen[key]
+                seen.pop(key)
         for light, shots in self.shots.items():
             near = {number for one in self.waiting if light not in one.made for number in self._rounds_of(light, one)}
             for number, shot in list(shots.items()):

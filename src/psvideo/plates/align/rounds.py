@@ -82,6 +82,7 @@ def aligned(
     schedule: Schedule | None = None,
     whites: dict[str, float] | None = None,
     put_by: PutBy | None = None,
+    coded: bool = False,
 ) -> Iterator[Round]:
     """Yield rounds whose plates all show one instant: one for every complete round, or for every flash of it.
 
@@ -92,7 +93,7 @@ def aligned(
     bits where all does, and two at other rates than the rounds'. ``with_ambient`` says that dark slots come as well:
     every round waits for its own, and takes it along as it is. ``whites`` (by light) are those of the clip's first
     plates, where ``plates`` begin later; what it lacks is put in. ``put_by`` takes the codes of plates that were moved;
-    without it they lie in memory.
+    without it they lie in memory. ``coded``: the plates are made of a movie's frames.
     """
     if how.leaves_plates:
         return gathered(
@@ -107,6 +108,7 @@ def aligned(
         whites={} if whites is None else whites,
         put_by=put_by,
         lamps=Lamps.of(how.lights, lights, how.ground),
+        coded=coded,
     )
     return _slid(plates, held, how, first, schedule)
 
@@ -158,11 +160,10 @@ def _complete(held: Held, how: Aligning) -> Iterator[Round]:
         if instant.round in held.ambient:
             instant.made[AMBIENT] = held.ambient[instant.round]
         held.waiting.popleft()
-        stood = held.stood(instant.round) if held.sketched else None
+        stood, calm = (held.stood(instant.round), held.calm(instant.round)) if held.sketched else (None, None)
         held.let_go()
-        yield replace(
-            handed_over(instant.made, instant.number, held.lights, stood), motion=instant.motion, unsure=instant.unsure
-        )
+        one = handed_over(instant.made, instant.number, held.lights, stood)
+        yield replace(one, motion=instant.motion, unsure=instant.unsure, calm=calm)
 
 
 def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:

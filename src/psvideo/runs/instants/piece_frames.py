@@ -15,7 +15,7 @@ from psvideo.model.timing import timed_camera
 from psvideo.plates.ambient.ambient_shown import ambient_before
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.part import Part
-from psvideo.plates.sequence import POOLED_ROUNDS
+from psvideo.plates.sequence import POOLED_ROUNDS, VOTING_BLOCKS
 from psvideo.plates.used_flashes import used_of
 from psvideo.runs.instants.job import Beginning, Job, Piece
 from psvideo.runs.instants.succession import Succession
@@ -58,14 +58,14 @@ def frames_of(job: Job, numbers: range) -> tuple[int, ...]:
 def _solved_from(job: Job, number: int) -> int:
     """Return the number of the first instant that the one with this number depends on.
 
-    It is pooled with its own block of rounds and the one before. What moves at the start of that block is known from
+    It is pooled with its own block of rounds and the one before, and classes are voted on by VOTING_BLOCKS before. What moves at the start of that block is known from
     the two instants before it: in the first of these, nothing is known to move yet. Where results are averaged, all
     this is so of the first instant of the average before.
     """
     average = job.over_time.denoise
     if average > 1:
         number = (number // average - 1) * average
-    return _first_of_block(number) - POOLED_ROUNDS - 2
+    return _first_of_block(number) - VOTING_BLOCKS * POOLED_ROUNDS - 2
 
 
 def _first_of_block(number: int) -> int:
