@@ -16,7 +16,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
-from psvideo.plates.sequence import POOLED_ROUNDS, Round
+from psvideo.plates.sequence import POOLED_ROUNDS, VOTING_BLOCKS, Round
 from psvideo.solve.at_rest import LOOKS_EVERY
 from psvideo.solve.instants import surfaces
 from psvideo.solve.normals import plate_noise, solving
@@ -126,13 +126,13 @@ def test_rounds_that_say_nothing_of_each_other_look_each(make_plan: MakePlan, lo
     assert len(looks) == 3
 
 
-def test_a_run_that_begins_with_the_block_before_looks_and_trusts_the_same(make_plan: MakePlan) -> None:
+def test_a_run_that_begins_with_the_blocks_before_looks_and_trusts_the_same(make_plan: MakePlan) -> None:
     """Runs are cut into pieces, stopped and resumed there: the bytes are the same."""
-    first = 1001 // POOLED_ROUNDS * POOLED_ROUNDS + POOLED_ROUNDS
-    rounds = [a_round(number) for number in range(1001, first + 2 * POOLED_ROUNDS + 3)]
-    whole = solved(rounds, make_plan)[first + POOLED_ROUNDS - 1001 :]
+    first, before = 1001 // POOLED_ROUNDS * POOLED_ROUNDS + POOLED_ROUNDS, VOTING_BLOCKS * POOLED_ROUNDS
+    rounds = [a_round(number) for number in range(1001, first + before + POOLED_ROUNDS + 3)]
+    whole = solved(rounds, make_plan)[first + before - 1001 :]
     beginning = [replace(one, stood=None) if one.number == first else one for one in rounds[first - 1001 :]]
-    piece = solved(beginning, make_plan)[POOLED_ROUNDS:]
+    piece = solved(beginning, make_plan)[before:]
     assert len(whole) == len(piece) == POOLED_ROUNDS + 3
     for one, other in zip(whole, piece, strict=True):
         np.testing.assert_array_equal(one.valid, other.valid)

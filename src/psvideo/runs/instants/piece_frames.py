@@ -58,9 +58,9 @@ def frames_of(job: Job, numbers: range) -> tuple[int, ...]:
 def _solved_from(job: Job, number: int) -> int:
     """Return the number of the first instant that the one with this number depends on.
 
-    It is pooled with its own block of rounds and the one before, and classes are voted on by VOTING_BLOCKS before. What moves at the start of that block is known from
-    the two instants before it: in the first of these, nothing is known to move yet. Where results are averaged, all
-    this is so of the first instant of the average before.
+    It is pooled with its own block of rounds and the one before, and VOTING_BLOCKS before its own vote on its classes.
+    What moves at the start of the first block is known from the two instants before it: in the first of these, nothing
+    is known to move yet. Where results are averaged, all this is so of the first instant of the average before.
     """
     average = job.over_time.denoise
     if average > 1:

@@ -43,10 +43,11 @@ BLOCK_NOISE_FACTOR, MOST_BLOCK_NOISE = 3.0, 2.0
 """Blocks that change by less than the first times the noise that blocks themselves show did not move: compression makes
 noise that a whole block shares. At most the second, in codes, counts: more is motion that fills the picture."""
 FINE_OF_CODED, OF_THREE_QUARTERS, MOST_CODED = 0.6, 5.5, 10.0
-"""In movies whose finest detail differs by fewer codes than the first, a codec took that away. What it leaves is coarser
-and lies where there is texture: blocks that change by less than the second times what three quarters of them do not
-exceed did not move, up to the third, in codes: more is motion that fills a quarter of the picture. (Of what stands still
-in H.264 and HEVC 99 % change by less than 2.0 to 3.1 times as much, all but a few blocks by less than 2.3 to 5.)"""
+"""In movies whose finest detail differs by fewer codes than the first, a codec took that away. What it leaves is
+coarser and lies where there is texture: blocks that change by less than the second times what three quarters of them do
+not exceed were not stirred, up to the third, in codes: more is motion that fills a quarter of the picture. (Of what
+stands still in H.264 and HEVC 99 % change by less than 2.0 to 3.1 times as much, and most of the rest by less than 5.)
+"""
 SOME, LEAST_LIT = 8, 8
 """Noise is estimated from every eighth row, where codes are at least this: below, noise is cut off at zero."""
 QUARTER_OF_NORMAL = 0.3186
