@@ -45,6 +45,7 @@ def _facts(number: int, seed: random.Random, lights: int = 4) -> InstantFacts:
         measured_share=perhaps(),
         moving_valid_share=perhaps(),
         slope_deg=some(),
+        spoilt_share=some(),
         likely_deg=perhaps(),
     )
 

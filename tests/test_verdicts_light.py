@@ -305,4 +305,6 @@ def test_even_colours_and_fine_codes_are_not_taken_for_few_levels() -> None:
 def test_of_many_lights_that_clip_the_worst_are_named_and_the_rest_is_counted() -> None:
     one = Footage(lights=8, clip=0.2, clipping=6, noise=0, solved=True).observed(0)
     (clipping,) = (line for line in exposure(one) if line.subject == "clipping")
-    assert re.fullmatch(r"6 of 8 lights clip parts of the subject: ('\w+' \d+ %(, | and )){4}2 more\.", clipping.found)
+    named, left = clipping.found.split(". ")
+    assert re.fullmatch(r"6 of 8 lights clip parts of the subject: ('\w+' \d+ %(, | and )){4}2 more", named)
+    assert re.fullmatch(r"That leaves fewer than three lights on \d+ % of it, where no normal is measured\.", left)

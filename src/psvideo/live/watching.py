@@ -94,7 +94,7 @@ class Watching:
         self.histograms = counts
         if len(observed.facts) >= ENOUGH:
             whole = replace(newest.timing, flashes=tuple(one for one in newest.timing.flashes if one.complete))
-            found = judgements(plan, whole, observed)
+            found = judgements(plan, whole, observed, foretold=True)
             self.lines = tuple(one.spelled(self.spell) for one in found)
             self.powers = power_words(plan, observed)
             self._observed = None

@@ -49,7 +49,8 @@ def cost_words(step_px: float) -> str:
     """Return the cost of this many pixels from flash to flash in words, with alignment and without."""
     cost = motion_cost(step_px)
     return (
-        f"about {100 * cost.lost:.0f} % of the normals there are lost (at worst {100 * cost.worst_lost:.0f} %), and "
+        f"about {100 * cost.lost:.0f} % of the normals there are lost (at worst {100 * cost.worst_lost:.0f} %; what "
+        "slides loses least, what tumbles most), and "
         f"with what is filled in they are off by about {cost.off_deg:.1f} degrees more than at rest (at worst "
         f"{cost.worst_off_deg:.0f}); without alignment by about {cost.unaligned_deg:.0f}"
     )

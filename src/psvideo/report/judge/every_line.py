@@ -25,6 +25,7 @@ def judgements(
     *,
     aligned: bool = False,
     opened: bool = False,
+    foretold: bool = False,
     take_s: float | None = None,
     curve_doubt: str = "",
     saturation: Judgement | None = None,
@@ -33,7 +34,7 @@ def judgements(
     """Return one line per thing that decides whether a take can be used; ``take_s`` is how long a take lasts of which
     only a part was looked at, ``curve_doubt`` what pictures say against the curve by which they were read,
     ``saturation`` that the sensor saturates where the plan does not say: nothing else is known of exposure then;
-    ``levels`` that files hold too few levels."""
+    ``levels`` that files hold too few levels. ``foretold``: what moves is only looked at, and a run aligns it."""
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
@@ -49,7 +50,7 @@ def judgements(
     )
     apart_px = 0.0 if aligned else apart_in_round_px(plan, timing, observed)
     lit = tuple(rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt, apart_px=apart_px))
-    moving = motion(plan, timing, observed, aligned=aligned, opened=opened)
+    moving = motion(plan, timing, observed, aligned=aligned, opened=opened, foretold=foretold)
     first = first_of_all((*exposed, *fired, *lit), curve_doubted=bool(curve_doubt or timing.half))
     first = first or first_seen_whole(moving, plan, timing)
     return (

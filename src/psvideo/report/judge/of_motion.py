@@ -16,8 +16,9 @@ from psvideo.report.judgement import Judgement
 from psvideo.report.observe.alignment.astray import LEAST_SHOWN_PX, Astray
 from psvideo.report.observe.observed import Observed
 
-FAST_PX, LOST_PX = 1.0, 4.0
-"""Pixels from flash to flash: 1 costs about 1 degree, 4 cost 5 to 9."""
+FAST_PX, LOST_PX, LOST_ALIGNED_PX = 1.0, 4.0, 16.0
+"""Pixels from flash to flash: 1 costs about 1 degree, 4 cost 12 without alignment; with it the last costs half of the
+normals of what moves."""
 FEW_MOVE, MUCH_CHANGES = 0.02, 0.1
 """Shares of the picture: fewer that move fast spoil no take; more that change and cannot be followed do."""
 ALL = 0.995
@@ -30,8 +31,17 @@ NOTABLE = 0.5
 """A turn, a change of scale or a shift that makes this share of how far pictures lie apart is told."""
 
 
-def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False) -> Judgement:
-    """Judge how far the fastest parts move from flash to flash, and within one; ``opened``: under an open shutter."""
+def motion(
+    plan: Plan,
+    timing: Timing,
+    observed: Observed,
+    *,
+    aligned: bool = False,
+    opened: bool = False,
+    foretold: bool = False,
+) -> Judgement:
+    """Judge how far the fastest parts move from flash to flash, and within one; ``opened``: under an open shutter.
+    ``foretold``: plates are only looked at, and a run brings them together."""
     shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
     speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
     blind = plan.mode != "synced" and is_blind(timing)
@@ -52,7 +62,7 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         return Judgement(subject="motion", grade="good", found=_slow(step_px, most_px))
     longest_s = max(plan.flashes[slot].duration_s for slot in plan.lit_slots)
     blur_px = step_px if plan.mode == "synced" else speed * longest_s
-    grave = step_px > LOST_PX and share > FEW_MOVE and not aligned
+    grave = step_px > (LOST_ALIGNED_PX if foretold else LOST_PX) and share > FEW_MOVE and not aligned
     return Judgement(
         subject="motion",
         grade="bad" if grave else "doubtful",

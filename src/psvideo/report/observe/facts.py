@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from psvideo.compute.ranks import quantile
 from psvideo.model.arrays import Flags
 from psvideo.model.channels import brightest_channel
+from psvideo.model.rig import LEAST_LIGHTS
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import Round
@@ -28,6 +29,8 @@ FEW, FAR_BRIGHTER = 8, 3.0
 """Of a small subject so many of the points looked at are bright, more than a sensor's hot pixels; they are so many
 times as bright as the brightest hundredth where that is not the subject's."""
 FAINT = 2.0**-12
+SHINES = 0.1
+"""A light that gives less than this share of the brightest does not shine on a point: it is in shadow there."""
 FEWEST_MOVING = 32
 """Of fewer points that move no share is known."""
 
@@ -49,7 +52,8 @@ class InstantFacts:
     reach, moving shadows too; None where hardly anything does.
     ``misfit`` is what the robust solver found common to the whole picture, ``slope_deg`` by how much typical normals
     are turned as albedo that goes with the slope shows it, ``likely_deg`` how far off they are likely to be beyond
-    noise, None where nothing shows it.
+    noise, None where nothing shows it. ``spoilt_share`` is the share of the subject of which clipping leaves fewer than
+    three lights, where three and more shine.
     """
 
     number: int
@@ -70,6 +74,7 @@ class InstantFacts:
     moving_valid_share: float | None = None
     slope_deg: float = 0.0
     likely_deg: float | None = None
+    spoilt_share: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,8 +190,19 @@ def instant_facts(
         misfit=None if surface is None else surface.misfit,
         slope_deg=0.0 if surface is None else surface.slope_deg,
         likely_deg=None if surface is None else surface.likely_deg,
+        spoilt_share=0.0 if left_out or not any(shares) else _spoilt(seen, whites),
         moving_valid_share=None if some is None or stirs is None else _moving_valid(some, subject, stirs),
     )
+
+
+def _spoilt(seen: Seen, whites: list[float]) -> float:
+    """Return the share of the subject that fewer than three lights show below ``whites`` (light,), of three and more
+    that shine on it."""
+    shines = seen.shown & (seen.bright > SHINES * seen.bright.max(axis=0))
+    clips = shines & (seen.bright >= np.array(whites, np.float32)[:, None, None])
+    reached = shines.sum(axis=0)
+    spoilt = clips.any(axis=0) & (reached >= LEAST_LIGHTS) & (reached - clips.sum(axis=0) < LEAST_LIGHTS)
+    return float(np.count_nonzero(spoilt & seen.subject) / max(np.count_nonzero(seen.subject), 1))
 
 
 def _moving_valid(some: Surface, subject: Flags, stirs: Flags) -> float | None:

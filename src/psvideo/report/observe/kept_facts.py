@@ -9,7 +9,7 @@ from psvideo.model.surface import Misfit, Reflectance
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.steadiness import Change
 
-_FIXED = Struct("=qI19d")
+_FIXED = Struct("=qI20d")
 """A round's number, of how many lights there are levels, and what it has one number for; NaN is what is not known."""
 
 
@@ -74,6 +74,7 @@ def _packed(one: InstantFacts) -> bytes:
         one.unseen_share,
         one.borrowed_share,
         one.slope_deg,
+        one.spoilt_share,
         *(nan if value is None else value for value in known),
         *change,
         *misfit,
@@ -83,7 +84,9 @@ def _packed(one: InstantFacts) -> bytes:
 
 
 def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
-    number, count, time_s, clipped_share, unseen_share, borrowed_share, slope_deg, *rest = _FIXED.unpack_from(packed)
+    number, count, time_s, clipped_share, unseen_share, borrowed_share, slope_deg, spoilt_share, *rest = (
+        _FIXED.unpack_from(packed)
+    )
     valid, ambient, speed_px_s, moving, measured, held, likely = (None if isnan(value) else value for value in rest[:7])
     change, misfit = rest[7:10], rest[10:]
     lights = memoryview(packed)[_FIXED.size :].cast("d")
@@ -96,6 +99,7 @@ def _unpacked(packed: bytes, shared: _Shared) -> InstantFacts:
         unseen_share=unseen_share,
         borrowed_share=borrowed_share,
         slope_deg=slope_deg,
+        spoilt_share=spoilt_share,
         likely_deg=likely,
         change=None
         if isnan(change[0])

@@ -38,6 +38,7 @@ def lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) -> 
         curve_doubt=take.clip.curve_doubt,
         saturation=saturation_of(take),
         levels=levels_of(take),
+        foretold=True,
     )
     if solved is None or moves(observed.facts):  # plates of what moves are not brought together here
         return (seen, *judged)
