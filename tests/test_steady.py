@@ -151,9 +151,9 @@ def test_a_pixel_that_most_rounds_trust_stays_so_where_one_light_hardly_reaches_
     """Noise moves it over the limit of shadow in two rounds of five, from three lights to one: that is no majority."""
     rounds = some(2 * POOLED_ROUNDS)
     for number, one in enumerate(rounds):
-        one.valid[:], source_of(one)[:] = number % 5 not in (2, 4), MEASURED
+        one.valid[:], source_of(one)[:] = True, MEASURED
         if number % 5 in (2, 4):
-            source_of(one)[:] = ONE_LIGHT
+            one.valid[:, :5], source_of(one)[:, :5] = False, ONE_LIGHT
         one.valid[0, 5::64], source_of(one)[0, 5::64] = False, TWO_LIGHTS  # something is doubtful all the time
     shown = list(run(rounds, 1001))
     for one in shown:
@@ -237,6 +237,17 @@ def test_what_moved_in_a_clip_s_first_round_is_not_held_in_the_next_one() -> Non
     assert apart[:8].max() < 1e-3, "as it was solved"
     assert apart[8:].max() > 0.05, "pooled with the first"
     assert (held.since[0, 0], held.since[-1, 0]) == (1, 2)
+
+
+@pytest.mark.parametrize(("trusted", "begins_again"), [(0.5, True), (0.98, False)])
+def test_where_a_second_round_trusts_far_more_all_pixels_begin_again(trusted: float, begins_again: bool) -> None:
+    """What repeats show of a codec's noise is known from the second round on: a bust kept what the first one said."""
+    rounds = some(4)
+    for number, one in enumerate(rounds):
+        one.valid[:], source_of(one)[:] = True, MEASURED
+        one.valid[:, int((trusted if number == 0 else 1.0) * SHAPE[1]) :] = False
+    shown = list(run(rounds, 1001))
+    assert [bool(one.valid.all()) for one in shown[1:]] == 3 * [begins_again]
 
 
 def test_bytes_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:

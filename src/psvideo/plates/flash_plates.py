@@ -81,8 +81,8 @@ def clip_plates(
         darks: Iterator[Plate] = chain(islice(dark_plates(take, timing), len(early)), later)
     else:
         darks = ambient_shown(take, timing, each_window, after=-1 if known is None else known.index)
-    ripple, early = ripple_of(take, timing), early_ripple(take, timing) if known is None else None
-    free = subtract(single, darks=darks, waits=not come_often, known=known, ripple=ripple, early=early)
+    ripple, first = ripple_of(take, timing), early_ripple(take, timing) if known is None else None
+    free = subtract(single, darks=darks, waits=not come_often, known=known, ripple=ripple, early=first)
     return map(_colour_of(clip), free)
 
 

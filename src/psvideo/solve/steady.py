@@ -1,11 +1,11 @@
 """Results held steady over rounds in which nothing moved: noise must not make classes and filled values flicker.
 
-Rounds are pooled in blocks of fixed numbers. A pixel's class is what most of the last rounds say, and what is not
-trusted by most of them, or not by this one, shows their mean; what is trusted by both stays as it was measured. As a
-block goes on, its rounds take the place of the block before, one after the other, so that nothing jumps. Where the
-picture changed, a pixel begins again: nothing is smeared. It does so in the next round once more, for plates are made
-of two flashes each, and that round's still of what was there before. So a result depends on its block and the one
-before, and on no other round.
+Rounds are pooled in blocks of fixed numbers. A pixel's class is what most of the last rounds say, as many as
+VOTING_BLOCKS hold, and what is not trusted by most of them, or not by this one, shows the mean of one block of them;
+what is trusted by both stays as it was measured. As a block goes on, its rounds take the place of the earliest, one
+after the other, so that nothing jumps. Where the picture changed, a pixel begins again: nothing is smeared. It does so
+in the next round once more, for plates are made of two flashes each, and that round's still of what was there before.
+So a result depends on its block and VOTING_BLOCKS before, and on no other round.
 """
 
 import math
@@ -44,8 +44,8 @@ IN_FILES_FROM = 1 << 22
 class Steady:
     """What is held between rounds of segments of rows where any pixel is not trusted, and in the block after.
 
-    ``number`` is the last round's, and ``rounds`` how many there were. ``slots`` (row, segment) says where in ``pool`` a
-    segment is, -1 where it is not; ``used`` of its slots are.
+    ``number`` is the last round's, and ``rounds`` how many there were. ``slots`` (row, segment) says where in ``pool``
+    a segment is, -1 where it is not; ``used`` of its slots are.
     ``since`` counts rounds at rest on a coarse grid, and the first one, before which nothing is known to have changed;
     ``trusted`` (row, col) is the last round's, and ``shown`` where all lights showed the picture in it, on a grid.
     ``spare`` is a folder in whose files large pools lie, None where they lie in memory.
@@ -110,7 +110,7 @@ def steadied(
     held.number = number
     held.since = _counted(_counted(held.since, stood), held.shown & shown, more=0)
     held.shown = shown
-    if 0 < held.rounds <= FIRST and _is_learnt(held.trusted, surface):
+    if 0 < held.rounds <= FIRST and _is_learnt(held.trusted, surface.valid, held.since > 0):
         held.since = np.minimum(held.since, ONCE_MORE)
     held.rounds += 1
     place = number % POOLED_ROUNDS + 1
@@ -134,10 +134,13 @@ def steadied(
     return held
 
 
-def _is_learnt(trusted: Bytes, surface: Surface) -> bool:
-    """Return whether far fewer or more pixels are trusted than in the round before, for what was learnt since."""
-    before, now = np.count_nonzero(trusted), np.count_nonzero(surface.valid)
-    return abs(now - before) > LEARNT * max(now, before)
+def _is_learnt(trusted: Bytes, valid: Flags, stood: Flags) -> bool:
+    """Return whether of pixels that ``stood`` (on a grid) far fewer or more are trusted than in the round before, for
+    what was learnt since."""
+    row, col = (np.arange(size) * each // size for size, each in zip(valid.shape, stood.shape, strict=True))
+    there = stood[np.ix_(row, col)]
+    before, now = (np.count_nonzero(one & there) for one in (trusted.view(np.bool_), valid))
+    return bool(abs(now - before) > LEARNT * max(now, before))
 
 
 def _coarse(moved: Flags) -> Flags:

@@ -28,7 +28,7 @@ WORK = 8
 @FUSED.inlined
 def forget_votes(votes: Bytes, i: int, source: int, valid: int, block: int) -> None:
     """Begin again with a pixel that changed, as if it had always been as it is."""
-    _always(votes, i, OF_SOURCE[source], valid, block)
+    _always(votes, i, int(OF_SOURCE[source]), valid, block)
     votes[REACHED, i], votes[TRUSTED, i], votes[VALUES, i] = 0, 0, 0
     votes[HAS_BEFORE, i] = (source > 0) & (valid == 0)
 
@@ -36,7 +36,7 @@ def forget_votes(votes: Bytes, i: int, source: int, valid: int, block: int) -> N
 @FUSED.inlined
 def begin_votes(votes: Bytes, i: int, rounds: int, trusted: int, block: int) -> None:
     """Begin with a pixel that was the same all the time, trusted or without a normal."""
-    _always(votes, i, trusted * ALL, trusted, block)
+    _always(votes, i, trusted * int(ALL), trusted, block)
     votes[REACHED, i], votes[TRUSTED, i] = (rounds - 1) * trusted * ALL, (rounds - 1) * trusted
     votes[VALUES, i], votes[HAS_BEFORE, i] = 0, 0
 

@@ -223,7 +223,8 @@ class Held:
         stirred = self._stirred(number) if self.coded else []
         if not stirred:
             return None
-        return cv2.dilate(np.any(stirred, axis=0).astype(np.uint8), np.ones((BESIDE, BESIDE), np.uint8)) == 0
+        around = cv2.dilate(np.any(stirred, axis=0).astype(np.uint8), np.ones((BESIDE, BESIDE), np.uint8))
+        return np.asarray(around == 0, np.bool_)
 
     def _stirred(self, number: int) -> list[Flags]:
         """Return what was stirred since the round before, until the next one, and since the first of the block, under

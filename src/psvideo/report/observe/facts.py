@@ -202,7 +202,7 @@ def _spoilt(seen: Seen, whites: list[float]) -> float:
     clips = shines & (seen.bright >= np.array(whites, np.float32)[:, None, None])
     reached = shines.sum(axis=0)
     spoilt = clips.any(axis=0) & (reached >= LEAST_LIGHTS) & (reached - clips.sum(axis=0) < LEAST_LIGHTS)
-    return float(np.count_nonzero(spoilt & seen.subject) / max(np.count_nonzero(seen.subject), 1))
+    return int(np.count_nonzero(spoilt & seen.subject)) / max(int(np.count_nonzero(seen.subject)), 1)
 
 
 def _moving_valid(some: Surface, subject: Flags, stirs: Flags) -> float | None:

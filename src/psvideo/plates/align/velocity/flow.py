@@ -161,11 +161,11 @@ def changes(before: Sketch, after: Sketch) -> Changes:
     if (vague := vague_between(before.filled, after.filled)) is not None:
         hidden = cv2.resize(vague.astype(np.float32), change.shape[::-1], interpolation=cv2.INTER_AREA)
         change[hidden > 0] = 0
-    local = cv2.blur(change * change, (AROUND, AROUND))
+    local = np.asarray(cv2.blur(change * change, (AROUND, AROUND)), np.float32)
     noise = noise_between(before, after)
     blocks = BLOCK_NOISE_FACTOR * min(_spread(change, before.blocks, CODED_BLOCKS), MOST_BLOCK_NOISE)
     least = max(LEAST_CHANGE, NOISE_FACTOR * noise / BLOCK_PX, blocks)
-    moved: Flags = local > least**2
+    moved: Flags = local > np.float32(least**2)
     coded = before.coded and noise < FINE_OF_CODED
     return Changes(moved, local > max(least, _left_by_codec(local, before.blocks)) ** 2 if coded else moved)
 
