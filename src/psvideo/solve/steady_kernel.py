@@ -1,12 +1,12 @@
 """Compiled loops that pool results over rounds at rest: votes on a pixel's class, and means of what is not trusted.
 
-A round always decides by as many rounds as a block has: by those of its own block so far, and for the rest by the share
-that the block before had. Blocks of 16, a pixel that was trusted in 12 rounds of the block before: in the 4th round of
-this one, and trusted in 1 of them, it has (1 + 12 * 12 / 16) / 16 = 0.63 of the votes, and is trusted; in the 10th
-round, trusted in 3, (3 + 6 * 12 / 16) / 16 = 0.47, and is not. So a class that changes, changes once a block at most.
-Values are averaged alike, over the rounds in which the pixel was not trusted. What is trusted by most rounds, and not
-by this one alone, shows their mean too, and claims no more than the error up to which a pixel is trusted: half of its
-rounds or more predict less.
+A round always decides by as many rounds as three blocks have: by those of its own block so far, by the two blocks
+before, and for the rest by the share that the third one had. Blocks of 16, a pixel that was trusted in all rounds of
+the three blocks before, and in none of this one and later: it has (16 - 16 / 16 * r + 32) / 48 of the votes after r
+rounds, and less than half of them after 24. Near a limit that takes longer, and so does a clip's first round, which
+counts as all rounds before. Values are averaged alike, over one block of rounds. What is trusted by most rounds, and
+not by this one alone, shows their mean too, and claims no more than the error up to which a pixel is trusted: half of
+its rounds or more predict less.
 """
 
 from typing import Any, NamedTuple
