@@ -109,7 +109,7 @@ LIKE_OTHERS = {"sun", "passing", "noisier"}
 SPOILT = [
     ("dark", "usable, with reservations", "exposure", r"4\.[4-8] stops below.*Open the aperture by about 4 stops"),
     ("bright", "not usable as it is: clipping", "clipping", r"Every light clips.*Close the aperture by about 1"),
-    ("key_clips", "not usable as it is: clipping", "clipping", r"'key' is clipped in [34]\d %.*(40|45|50|55) %"),
+    ("key_clips", "usable, with reservations", "clipping", r"'key' is clipped in [34]\d .*lights on \d %.*(40|45) %"),
     ("weak", "usable, with reservations", "lights", r"'left' is weak: [67] %"),
     ("dead", "doubtful: see below", "lights", r"'left' gives no light"),
     ("ambient", "usable, with reservations", "ambient", r"3\d % of the signal.*Cover windows"),
