@@ -7,7 +7,7 @@ import pytest
 
 from psvideo.model.arrays import Mask
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.trust.continued import continued
+from psvideo.solve.normals.trust.continued import BAND_ROWS, continued, continued_at_rest
 
 SHAPE = 24, 40
 STRIP = slice(19, 21)
@@ -176,3 +176,35 @@ def test_half_floats_and_threads_change_nothing_that_shows(monkeypatch: pytest.M
 def test_a_surface_without_errors_passes_as_it_is() -> None:
     surface = replace(with_strip(facing(0.0), 4.0), error_deg=None)
     assert continued(surface, EVERYWHERE, limit_deg=LIMIT_DEG) is surface
+
+
+def test_across_the_edge_of_a_shadow_on_what_stands_a_face_goes_on() -> None:
+    true = facing(np.linspace(-20, 20, SHAPE[1]))
+    told = continued_at_rest(with_strip(true, 6.0), None, limit_deg=LIMIT_DEG)
+    assert told.valid[4:-4].all()
+    assert off_deg(told, true)[4:-4].max() < 1
+
+
+def test_what_stands_and_was_trusted_stays_to_the_bit_at_edges_of_paint_too() -> None:
+    given = with_strip(facing(20.0), 26.0)
+    albedo = np.where(np.arange(SHAPE[1]) < 10, 0.2, given.albedo).astype(np.float32)
+    before = replace(given, albedo=albedo)
+    before.normals[:, 9] = facing(25.0)[:, 9]
+    kept, trusted = before.normals.copy(), before.valid.copy()
+    told = continued_at_rest(before, None, limit_deg=LIMIT_DEG)
+    np.testing.assert_array_equal(told.normals[trusted], kept[trusted])
+
+
+def test_what_moves_is_not_told_by_what_stands_and_bands_leave_no_seam() -> None:
+    shape = (BAND_ROWS + 30, 40)
+    normals = np.zeros((*shape, 3), np.float32)
+    normals[..., 2] = 1
+    valid = np.ones(shape, np.bool_)
+    valid[:, STRIP] = False
+    error = np.where(valid, 0.5, 8).astype(np.float32)
+    surface = Surface(normals=normals, albedo=np.full(shape, 0.5, np.float32), valid=valid, error_deg=error)
+    moves = np.zeros(shape, np.bool_)
+    moves[:20] = True
+    told = continued_at_rest(surface, moves, limit_deg=LIMIT_DEG)
+    assert told.valid[24:-4].all()
+    assert not told.valid[:19, STRIP].any()

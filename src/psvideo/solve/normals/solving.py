@@ -20,7 +20,7 @@ from psvideo.solve.normals.robust.reflectance import LIGHTS_FOR_REFLECTANCE
 from psvideo.solve.normals.robust.subject_points import SubjectPoints
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Looks, Usable
-from psvideo.solve.normals.trust.continued import continued
+from psvideo.solve.normals.trust.continued import continued, continued_at_rest
 from psvideo.solve.normals.trust.doubts import Doubts
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import Judging, emptied, judged, with_unchecked
@@ -94,6 +94,8 @@ class Solving:
         solved, one, noise = how.measured(given, noise=before.known_noise)
         one = replace(one, metal_deg=metal_deg)
         known, doubts = judged(solved, one, noise, before=before)
+        moves = one.moves if one.moved else None
+        known = continued_at_rest(known, moves, limit_deg=Judging().most_error_deg)
         if one.moved and one.moves is not None:
             known = continued(known, one.moves, limit_deg=Judging().most_moving_error_deg)
         without = left_out(known, one, solved=solved.valid) if self.fill else None

@@ -1,4 +1,5 @@
-"""Where doubt is narrow, normals continue across it: at edges of paint plates lie a part of a pixel beside each other.
+"""Where doubt is narrow, normals continue across it: at edges of paint of what moves, where plates lie a part of a
+pixel beside each other, and at edges of shadows of what stands.
 
 A strip of a pixel or two, on whose both sides normals are trusted and agree, is no hole in the surface, and no crease
 either where it is an edge of paint. Its normals are means of what was solved there and of a plane through those around,
@@ -41,6 +42,8 @@ may well be."""
 OF_APART = 0.4
 """So much of what it contradicts the pixel's own normal by, and paint does not explain, it may be off itself."""
 LEAST_DEG, LEAST_LEVEL = 0.2, 0.01
+TWO_PX, BAND_ROWS = 2, 256
+"""So far away something must be sure; and so many rows of a picture are looked at together: what bounds memory."""
 AT_ONCE = 4096
 """Points that a thread takes together."""
 
@@ -52,18 +55,48 @@ def continued(surface: Surface, moves: Mask, *, limit_deg: float) -> Surface:
     error = surface.error_deg
     if error is None:
         return surface
-    there = at_points(moves, error.shape)
+    shape = error.shape
+    stride = max(round(shape[1] / moves.shape[1] / FINEST), 1)
+    return _continued(
+        surface, error, at_points(moves, shape), _Asked(limit_deg=limit_deg, stride=stride, at_paint=True)
+    )
+
+
+def continued_at_rest(surface: Surface, moves: Mask | None, *, limit_deg: float) -> Surface:
+    """Return the surface with normals that are trusted on across narrow doubt in what does not move: edges of shadows,
+    and where noise is a little too much. There plates lie on each other, and edges of paint turn nothing."""
+    error = surface.error_deg
+    if error is None:
+        return surface
+    shape = error.shape
+    rests = np.ones(shape, np.bool_) if moves is None else ~at_points(moves, shape)
+    return _continued(surface, error, rests, _Asked(limit_deg=limit_deg, stride=1, at_paint=False))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Asked:
+    """What is asked: normals with errors up to ``limit_deg``, by every ``stride``-th pixel around, and those at edges
+    of paint as well if ``at_paint``."""
+
+    limit_deg: float
+    stride: int
+    at_paint: bool
+
+
+def _continued(surface: Surface, error: NDArray[np.floating], there: Mask, asked: _Asked) -> Surface:
     solved, sure = there & (error > 0), surface.valid & there
     if not sure.any():
         return surface
-    stride = max(round(error.shape[1] / moves.shape[1] / FINEST), 1)
-    part = _Part.around(solved, (surface, error), sure, stride)
-    normal, error_deg, takes = part.looked_at(limit_deg)
-    rows, cols = (part.places[takes] + np.array(part.corner, np.uint32)).T
-    surface.normals[rows, cols] = normal[takes].astype(surface.normals.dtype)
-    error[rows, cols] = error_deg[takes].astype(error.dtype)
+    found = [
+        part.taken(asked.limit_deg)
+        for first in range(0, len(error), BAND_ROWS)
+        if (part := _Part.around(solved, (surface, error), sure, asked, first)) is not None
+    ]
     valid = surface.valid.copy()
-    valid[rows, cols] = True
+    for (rows, cols), normals, errors_deg in found:  # after all were looked at: what is told is what was solved
+        surface.normals[rows, cols] = normals.astype(surface.normals.dtype)
+        error[rows, cols] = errors_deg.astype(error.dtype)
+        valid[rows, cols] = True
     return replace(surface, valid=valid)
 
 
@@ -83,20 +116,32 @@ class _Part:
     stride: int
 
     @classmethod
-    def around(cls, solved: Mask, given: tuple[Surface, NDArray[np.floating]], sure: Mask, stride: int) -> "_Part":
-        """Return what lies around what moves of a surface, which is ``given`` with its errors, and is ``solved`` (row,
-        col): asked is what is not ``sure`` of that, and what lies at an edge of paint."""
-        (surface, error), reach = given, REACH_PX * stride
-        spans = [np.flatnonzero(solved.any(axis=axis)) for axis in (1, 0)]
-        part = tuple(slice(max(int(span[0]) - reach, 0), int(span[-1]) + reach + 1) for span in spans)
-        albedo = surface.albedo[part].astype(np.float32)
-        level = np.ascontiguousarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1))
+    def around(
+        cls, solved: Mask, given: tuple[Surface, NDArray[np.floating]], sure: Mask, asked: _Asked, first: int
+    ) -> "_Part | None":
+        """Return what lies around what is asked in rows from ``first`` on of a surface, which is ``given`` with its
+        errors, and is ``solved`` (row, col): what is not ``sure`` of that, and what lies at an edge of paint; None
+        where nothing is."""
+        (surface, error), stride = given, asked.stride
+        reach, band = REACH_PX * stride, slice(first, first + BAND_ROWS)
+        open_ = solved[band] if asked.at_paint else solved[band] & ~sure[band] & _beside(sure, first)
+        if not open_.any():
+            return None
+        rows, cols = (np.flatnonzero(open_.any(axis=axis)) for axis in (1, 0))
+        top, left = max(first + int(rows[0]) - reach, 0), max(int(cols[0]) - reach, 0)
+        part = slice(top, first + int(rows[-1]) + reach + 1), slice(left, int(cols[-1]) + reach + 1)
+        level = _level(surface.albedo[part])
         normals = np.ascontiguousarray(np.moveaxis(surface.normals[part], -1, 0), np.float32)
-        step = _paint_step(level, error[part] > 0, stride)
-        at_edge = (step > 0) & _departs(normals, sure[part], 2 * reach + 1)
+        step, doubted = np.zeros_like(level), np.zeros(level.shape, np.bool_)
+        own = slice(first - top if top < first else 0, first + BAND_ROWS - top)
+        doubted[own] = open_[max(top - first, 0) :, left : left + level.shape[1]][: doubted[own].shape[0]]
+        if asked.at_paint:
+            step = _paint_step(level, error[part] > 0, stride)
+            at_edge = (step > 0) & _departs(normals, sure[part], 2 * reach + 1)
+            doubted &= ~sure[part] | at_edge
         return cls(
-            places=np.argwhere(solved[part] & (~sure[part] | at_edge)).astype(np.uint32),
-            corner=(part[0].start, part[1].start),
+            places=np.argwhere(doubted).astype(np.uint32),
+            corner=(top, left),
             normals=normals,
             level=level,
             step=step,
@@ -104,6 +149,12 @@ class _Part:
             sure=np.ascontiguousarray(sure[part]),
             stride=stride,
         )
+
+    def taken(self, limit_deg: float) -> tuple[tuple[Indices, Indices], Doubles, Doubles]:
+        """Return rows and columns of the points that continue, with their normals and errors in degrees."""
+        normals, error_deg, takes = self.looked_at(limit_deg)
+        rows, cols = (self.places[takes] + np.array(self.corner, np.uint32)).T
+        return (rows, cols), normals[takes], error_deg[takes]
 
     def looked_at(self, limit_deg: float) -> tuple[Doubles, Doubles, Mask]:
         """Return the points' normals (point, 3) and errors in degrees with what continues from around, and which of
@@ -135,6 +186,7 @@ class _Part:
             near=_nearness(),
             stride=self.stride,
             margin=ALBEDO_MARGIN,
+            fewest=FEWEST,
         )
         found = np.empty((len(self.places), 6))
 
@@ -143,6 +195,25 @@ class _Part:
 
         over_ranges(look, len(self.places), each=AT_ONCE)
         return found
+
+
+def _level(albedo: NDArray[np.floating]) -> Floats:
+    """Return the mean of an albedo's channels, (row, col)."""
+    if albedo.ndim == 2:
+        return np.ascontiguousarray(albedo, np.float32)
+    level = np.zeros(albedo.shape[:2], np.float32)
+    for channel in range(albedo.shape[-1]):
+        level += albedo[..., channel]
+    level /= np.float32(albedo.shape[-1])
+    return level
+
+
+def _beside(sure: Mask, first: int) -> Mask:
+    """Return where something within two pixels is sure, in a band of rows: farther off too little of a window is."""
+    top = max(first - TWO_PX, 0)
+    some = np.ascontiguousarray(sure[top : first + BAND_ROWS + TWO_PX]).view(np.uint8)
+    near = cv2.dilate(some, np.ones((2 * TWO_PX + 1,) * 2, np.uint8))
+    return np.asarray(near[first - top :][:BAND_ROWS]).astype(np.bool_)
 
 
 def _paint_step(level: Floats, known: Mask, stride: int) -> Floats:

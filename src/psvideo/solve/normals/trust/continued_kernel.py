@@ -19,7 +19,8 @@ DEGREES, SINGULAR = 180 / np.pi, 1e-9
 class AroundPoint(NamedTuple):
     """Normals (3, row, col), ``level`` of albedo and ``error`` in degrees (row, col), and which are ``sure``. ``near``
     (2 r + 1, 2 r + 1) are weights by distance, 0 in the middle, of every ``stride``-th pixel around one. A point whose
-    level lies outside those around by more than the share ``margin`` is of another surface."""
+    level lies outside those around by more than the share ``margin`` is of another surface; and where no more than the
+    share ``fewest`` of the window is sure nothing goes on."""
 
     normals: Floats
     level: Floats
@@ -28,6 +29,7 @@ class AroundPoint(NamedTuple):
     near: Doubles
     stride: int
     margin: float
+    fewest: float
 
 
 @FUSED.kept
@@ -38,12 +40,19 @@ def continue_points(places: Indices, around: AroundPoint, found: Doubles, first:
     sums, right, fit, facts = np.empty(6), np.empty((3, 3)), np.empty((3, 3)), np.empty(5)
     for at in range(first, last):
         row, col = places[at, 0], places[at, 1]
+        if _sure_share(row, col, around) <= around.fewest:
+            found[at] = 0.0
+            continue
         normal = around.normals[:, row, col].astype(np.float64)
         found[at], facts[3], facts[4] = 0.0, np.inf, -np.inf
         wide, error_deg, uncertain = TWICE * max(float(around.error[row, col]), NEAR_DEG), 0.0, 0.0
+        margin, level, told = around.margin, around.level[row, col], 0.0
         for _ in range(PASSES):
             _gather(row, col, around, normal, wide, sums, right, facts)
             spread, told = _fit_plane(sums, right, fit), facts[0]
+            if not facts[3] * (1 - margin) <= level <= facts[4] * (1 + margin):
+                told = 0.0
+                break
             length = np.sqrt(np.square(fit[0]).sum())
             if spread < 0.0 or length < SINGULAR:
                 told = 0.0
@@ -53,10 +62,25 @@ def continue_points(places: Indices, around: AroundPoint, found: Doubles, first:
             left = max(facts[2] - (fit * right).sum(), 0.0) / sums[0] * DEGREES * DEGREES
             error_deg = np.sqrt(claimed + left * uncertain)
             wide = max(TWICE * np.sqrt(left + claimed), NEAR_DEG)
-        margin, level = around.margin, around.level[row, col]
-        if told > 0.0 and facts[3] * (1 - margin) <= level <= facts[4] * (1 + margin):
+        if told > 0.0:
             found[at, :3] = normal
             found[at, 3], found[at, 4], found[at, 5] = error_deg, uncertain, told / around.near.sum()
+
+
+@FUSED.inlined
+def _sure_share(row: int, col: int, around: AroundPoint) -> float:
+    """Return which share of the window around a pixel is sure."""
+    rows, cols = around.sure.shape
+    near, stride = around.near, around.stride
+    reach = near.shape[0] // 2
+    share, whole = 0.0, 0.0
+    for below in range(-reach, reach + 1):
+        for beside in range(-reach, reach + 1):
+            r, c = row + below * stride, col + beside * stride
+            whole += near[reach + below, reach + beside]
+            if r >= 0 and c >= 0 and r < rows and c < cols and around.sure[r, c]:
+                share += near[reach + below, reach + beside]
+    return share / whole
 
 
 @FUSED.inlined
