@@ -101,15 +101,16 @@ def turned_by_causes(thin: Surface, step: int, one: Evidence, known: Mask, *, of
     some = sizes > 0
     if np.count_nonzero(some) < LEAST_POINTS:
         return None
-    turned = causes(points.only(some), points.normals[some] * sizes[some, None], of_noise=of_noise)
+    seen = points.only(some), points.normals[some] * sizes[some, None]
+    turned = causes(*seen, of_noise=of_noise, distant=one.lit.near is None)
     angles = np.stack([turned.by_model_deg, turned.by_cause_deg], axis=-1).astype(np.float64)
     around = _around(known.shape, (here[0][some], here[1][some]), angles, int(known.sum()))
     return Turned(around[..., 0], turned.explained, around[..., 1], turned.by_rig)
 
 
-def causes(points: SubjectPoints, g: Doubles, *, of_noise: float = 0.0) -> Turned:
+def causes(points: SubjectPoints, g: Doubles, *, of_noise: float = 0.0, distant: bool = True) -> Turned:
     """Return what turns the normals of points, given times albedo (point, 3); noise makes the share ``of_noise`` of the
-    squares of what is left over.
+    squares of what is left over. Of lights that are not ``distant`` none is a cause: a distance that is off looks alike.
 
     By a model: one that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts
     nothing, one that explains twice as much wholly: what comes and goes by its noise would flicker. Nor does one count
@@ -120,7 +121,7 @@ def causes(points: SubjectPoints, g: Doubles, *, of_noise: float = 0.0) -> Turne
     """
     sizes, most = np.linalg.norm(g, axis=1), np.zeros(len(g))
     typical, rig = median(sizes), other_rig(points, g)
-    by_rig = explained = _clearly(rig.left, of_noise)
+    by_rig = explained = _clearly(rig.left, of_noise) if distant else 0.0
     by_cause = np.zeros(len(g))
     if explained:
         by_cause = explained * turned_by_rig_deg(points, g / sizes[:, None], rig)
