@@ -110,7 +110,8 @@ def turned_by_causes(thin: Surface, step: int, one: Evidence, known: Mask, *, of
 
 def causes(points: SubjectPoints, g: Doubles, *, of_noise: float = 0.0, distant: bool = True) -> Turned:
     """Return what turns the normals of points, given times albedo (point, 3); noise makes the share ``of_noise`` of the
-    squares of what is left over. Of lights that are not ``distant`` the rig is no cause: distances that are off look alike.
+    squares of what is left over. Where lights are not ``distant`` the rig is no cause: distances that are off look as
+    it does.
 
     By a model: one that shines, is rough or soft, whichever turns them most. A model that explains LEAST_EVENLY counts
     nothing, one that explains twice as much wholly: what comes and goes by its noise would flicker. Nor does one count
