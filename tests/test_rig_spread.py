@@ -151,3 +151,11 @@ def test_beside_much_noise_a_rig_that_is_off_by_a_degree_is_still_the_cause() ->
     lit = Illumination(directions=claimed, intensities=np.ones((5, 3)))
     surface, one, noise = Solving().measured(LitPlates(case.plates, lit, mask=inside))
     assert looked_at(surface, one, noise)[1].explained > 0.5
+
+
+def test_of_near_lights_the_rig_is_no_cause() -> None:
+    """What a distance that is off leaves over, other lights would explain as well."""
+    rng, true = np.random.default_rng(3), ring(5, 40)
+    claimed = true + np.radians(3) * rng.normal(size=true.shape)
+    one = seen(true, claimed / np.linalg.norm(claimed, axis=1, keepdims=True), rng)
+    assert few_checked.causes(one.points, one.g, distant=False).explained == 0
