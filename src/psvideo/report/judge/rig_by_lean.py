@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from psvideo.report.judge.of_exposure import LOST_CLIPPED
 from psvideo.report.judge.rig_by_plates import surface_leaves
 from psvideo.report.judge.typical_error import AT_REST, LOST_DEG, moves, off_deg, quiet
 from psvideo.report.judgement import Judgement
@@ -33,6 +32,8 @@ under right rigs, most of it no turn."""
 MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
 rig as well, on photographs by 9 to 15 degrees."""
+LEANS_CLIPPED = 0.1
+"""Where more than this share of the samples is clipped, normals lean for that."""
 BY_GLOSS = 1.5
 """What shines, or lets light through, leans normals under a right rig as well, at gains up to this: busts and vases of
 satin, wax and lustre under three lights 0.02 to 1.25; matte ones under lights that are 10 to 20 degrees off 1.4 to
@@ -125,7 +126,7 @@ def _lost(usual: Lean, shown_deg: float) -> bool:
 
 def _clips(observed: Observed) -> bool:
     """Return whether so much is clipped that normals of few lights are left, which lean for that."""
-    return float(np.median([one.clipped_share for one in observed.facts])) > LOST_CLIPPED
+    return float(np.median([one.clipped_share for one in observed.facts])) > LEANS_CLIPPED
 
 
 def _nearly_in_a_plane(observed: Observed) -> bool:
