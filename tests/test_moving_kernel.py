@@ -24,7 +24,7 @@ def test_how_unlike_plates_are_is_what_single_pixels_make_it(fine: tuple[int, in
     rng = np.random.default_rng(3)
     coarse = (max(fine[0] // 2, 1), max(fine[1] // 2, 1)) if fine[1] == 43 else fine
     befores, afters = rng.integers(0, 30, (2, 3, *fine)).astype(np.uint8)
-    spans_s = rng.uniform(-0.2, 1, (3, 2)).astype(np.float32)
+    spans_s = rng.uniform(-0.2, 1, (3, 2, coarse[0])).astype(np.float32)
     velocity = rng.uniform(-12, 12, (2, *coarse)).astype(np.float32)
     out = np.full(coarse, -1, np.float32)
     room = np.zeros((4, -(-coarse[1] // EIGHT) * EIGHT), np.float32)
@@ -38,7 +38,7 @@ def test_how_unlike_plates_are_is_what_single_pixels_make_it(fine: tuple[int, in
             x, y = (float(plane[row, col]) * per for plane, per in zip(velocity, (wide, high), strict=True))
             across, down = (col + 0.5) * wide - 0.5, (row + 0.5) * high - 0.5
             total = 0.0
-            for light, (since, until) in enumerate(spans_s.tolist()):
+            for light, (since, until) in enumerate(spans_s[:, :, row].tolist()):
                 one = _between(befores[light], down - y * since, across - x * since)
                 other = _between(afters[light], down + y * until, across + x * until)
                 total += (other - one) ** 2 / ((other - one) ** 2 + float(UNLIKE_SQUARE))

@@ -13,6 +13,7 @@ from psvideo.errors import check_kind
 from psvideo.model.choices import SplitMethod
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
+from psvideo.plates.align.lent.bringing import Bringing
 from psvideo.plates.align.open_shutter import with_open_shutter
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient.ambient_regression import Separated
@@ -97,19 +98,21 @@ def gather(
     if take.unmixing is None:
         check_separable(plan)
     borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
+    follows = aligning is not None and aligning.align != "none"
+    bringing = Bringing(lights=_names(take)) if borrows and follows else None
     turn = take.clip.turn
     window = None if each_window is None else lambda found: each_window(upright_window(found, turn))
     made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=window, unseen=borrows)
     plates = _named_plates(take, timing, _shown(made, each_flash), start_number=start_number)
     if borrows and turn.transposed:  # rows are borrowed while they are rows
-        plates, borrows = with_nearest_rows(plates), False
+        plates, borrows = with_nearest_rows(plates, bringing), False
     plates = _shown(map(partial(upright, turn=turn), plates), each_plate)
     if not with_ambient:
         plates = filter(lambda plate: plate.light != AMBIENT, plates)
     if aligning is None:
         return _rounds_as_they_are(take, timing, plates, start_number=start_number)
     rounds = aligned(
-        with_nearest_rows(plates) if borrows else plates,
+        with_nearest_rows(plates, bringing) if borrows else plates,
         _names(take),
         aligning,
         first=start_number,

@@ -22,6 +22,7 @@ class LightPlate:
     show ``time_s``. ``sideways`` is a picture that was turned by a quarter: the sensor's rows are its columns.
     ``filled`` (row, col) is what ``clipped_flashes`` said of an ``unmixed`` plate before it was turned or given rows
     of others, which leaves nothing of its flashes; None while its picture still holds them.
+    ``brought``: what rows of other flashes show was moved to ``time_s``; ``shown_s`` still says when these were.
     """
 
     light: str
@@ -35,6 +36,7 @@ class LightPlate:
     shown_s: Doubles | None = None
     sideways: bool = False
     filled: Bytes | None = None
+    brought: bool = False
 
     @property
     def image(self) -> Image:
@@ -67,7 +69,9 @@ class LightPlate:
     @property
     def own(self) -> NDArray[np.bool_]:
         """What the plate's own flash showed, (row, 1), or (1, col) or (row, col) where the picture was turned; the rest
-        comes from flashes before or after."""
+        comes from flashes before or after. All that is seen, where that was brought to its instant."""
+        if self.brought:
+            return self.pixels_seen if self.seen.ndim == 2 else self.lines_seen
         if self.shown_s is None:
             return self.lines_seen
         return np.asarray(self.lines_seen & (self.shown_s == self.time_s).reshape(self.shape[0], -1))

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from psvideo.model.arrays import Bytes, Doubles, Flags
 from psvideo.model.camera import Camera
+from psvideo.plates.align.lent.bringing import Bringing
+from psvideo.plates.align.lent.brought import LentRows, brought
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.several_lights.clipped_flashes import with_filled
@@ -34,7 +36,7 @@ def has_blind_time(camera: Camera) -> bool:
     return abs(camera.exposure_s / camera.frame_period_s - 1) > BLIND
 
 
-def with_nearest_rows(plates: Iterable[LightPlate]) -> Iterator[LightPlate]:
+def with_nearest_rows(plates: Iterable[LightPlate], bringing: Bringing | None = None) -> Iterator[LightPlate]:
     """Yield plates in their order, the rows that they lack taken from the nearest plates of the same light.
 
     Held are the rows that the waiting plates' own flashes showed, and the latest that is known of each row of every
@@ -43,12 +45,14 @@ def with_nearest_rows(plates: Iterable[LightPlate]) -> Iterator[LightPlate]:
     waiting: deque[_Waiting] = deque()
     known: dict[str, LightPlate] = {}
     for plate in plates:
+        if bringing is not None:
+            bringing.look_at(plate)
         waiting.append(_Waiting.of(plate))
         del plate
         while _can_go(waiting, known):
-            yield _released(waiting, known)
+            yield _released(waiting, known, bringing)
     while waiting:
-        yield _released(waiting, known)
+        yield _released(waiting, known, bringing)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +108,7 @@ def _can_go(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> bool:
     return bool(seen.all()) or len(later) >= MOST_LATER
 
 
-def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPlate:
+def _released(waiting: deque[_Waiting], known: dict[str, LightPlate], bringing: Bringing | None) -> LightPlate:
     """Return the first plate with the rows that it lacks from the nearest others, and note what it showed itself."""
     later, first = _later(waiting), waiting.popleft()
     own = first.given()
@@ -113,6 +117,8 @@ def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPl
     if own.rows_seen.all():
         return own
     found = known[own.light]
+    motion = None if bringing is None or own.filled is not None else bringing.motion_in(own.number)
+    lent = [] if motion is None else [*_lent(earlier), *(run for one in later for run in _lent(one.given()))]
     image, shown_s, seen, full = found.image.copy(), found.flashed_s.copy(), found.rows_seen.copy(), found.filled
     for one in later:
         nearer = ~seen | (abs(one.plate.time_s - own.time_s) < np.abs(shown_s - own.time_s))
@@ -120,7 +126,18 @@ def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPl
         one.put(image, wanted)
         shown_s[wanted], seen[wanted] = one.plate.time_s, True
         full = _full_of(full, one.plate.filled, wanted)
-    return replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s, filled=full)
+    filled = replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s, filled=full)
+    return filled if motion is None else brought(filled, own.rows_seen, lent, motion)
+
+
+def _lent(plate: LightPlate | None) -> list[LentRows]:
+    """Return the pieces of rows that a plate shows, each of one flash."""
+    if plate is None:
+        return []
+    image, shown_s, seen = plate.image, plate.flashed_s, plate.rows_seen
+    ends = np.flatnonzero((np.diff(shown_s) != 0) | (np.diff(seen.astype(np.int8)) != 0)) + 1
+    runs = zip([0, *ends], [*ends, len(seen)], strict=True)
+    return [LentRows(image=image[a:b], first=int(a), time_s=float(shown_s[a])) for a, b in runs if seen[a]]
 
 
 def _full_of(own: Bytes | None, other: Bytes | None, rows: Flags) -> Bytes | None:

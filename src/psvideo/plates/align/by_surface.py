@@ -231,7 +231,7 @@ class BySurface:
         total = np.zeros([-(-length // stride) for length in lights.shape], np.float32)
         for plate in plates:
             out, way = np.empty_like(total), mean_velocity(velocity, bend, plate.span_s)
-            moved_rows(plate.codes, np.float32(plate.span_s), way, stride, 0, len(out), out)
+            moved_rows(plate.codes, np.full(way.shape[1], plate.span_s, np.float32), way, stride, 0, len(out), out)
             total += np.float32(plate.counts) * light_of(out)
         return total * self.lamps.evening(light, total.shape)
 

@@ -15,6 +15,7 @@ from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.align.velocity.followed import Followed, Pair
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
+from psvideo.plates.light_plate import LightPlate
 
 Shifts = tuple[tuple[float, float], tuple[float, float]]
 
@@ -88,7 +89,7 @@ def steady_at(held: Held, instant: DueInstant, pairs: Mapping[str, Pair]) -> Ste
     known = [pair for pair in every if pair is not None]
     stood = [light for light in held.lights if light not in pairs and not _shows(held, light, instant)]
     plates = [*held.plates_of(instant), *(held.own_shot(light, instant).plate for light in stood)]
-    if len(known) < len(every) or not all(plate is not None and plate.own.all() for plate in plates):
+    if len(known) < len(every) or not all(plate is not None and _is_whole(plate) for plate in plates):
         return None
     path = camera_path(known, held.lamps)
     if path is None:
@@ -96,6 +97,10 @@ def steady_at(held: Held, instant: DueInstant, pairs: Mapping[str, Pair]) -> Ste
     for light in stood:
         held.take_back(light, instant)
     return Steadied(path=path, instant_s=instant.time_s, shape=known[0].before.codes.shape)
+
+
+def _is_whole(plate: LightPlate) -> bool:
+    return not plate.brought and bool(plate.own.all())
 
 
 def _shows(held: Held, light: str, instant: DueInstant) -> bool:

@@ -7,6 +7,7 @@ shading changes as surfaces turn.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -45,16 +46,20 @@ better."""
 
 @dataclass(frozen=True, kw_only=True)
 class AllLights:
-    """The lights' codes as flow sees them (before, after), their detail (light, row, col), and the times to them."""
+    """The lights' codes as flow sees them (before, after), their detail (light, row, col), and the times to them: of
+    every light, ``spans_s`` (light, 2), and where rows of a plate show several instants, of each row of velocities,
+    ``rows_s`` (light, 2, row); None where all rows of a plate show one."""
 
     codes: tuple[tuple[Codes8, Codes8], ...]
     befores: Codes8
     afters: Codes8
     spans_s: Floats
+    rows_s: Floats | None = None
 
     @classmethod
-    def of(cls, pairs: Sequence[Pair], time_s: float) -> "AllLights":
-        """Make the plates of pairs comparable at an instant."""
+    def of(cls, pairs: Sequence[Pair], time_s: float, rows_s: Floats | None = None) -> "AllLights":
+        """Make the plates of pairs comparable at an instant; ``rows_s`` (light, 2, row of the sketches) are the times
+        to their rows, where these show several instants."""
         codes = tuple(comparable(pair.before, pair.after) for pair in pairs)
         befores, afters = np.empty((2, len(pairs), *codes[0][0].shape), np.uint8)
 
@@ -62,8 +67,19 @@ class AllLights:
             befores[light], afters[light] = map(detail_of, codes[light])
 
         over_ranges(sharpen, len(pairs), each=1)
+        if rows_s is not None:
+            step = COARSE if befores[0].size >= FINE_PIXELS else 1
+            each = np.ascontiguousarray(rows_s[:, :, : len(befores[0]) // step * step : step])
+            return cls(codes=codes, befores=befores, afters=afters, spans_s=rows_s.mean(axis=2), rows_s=each)
         spans_s = [(time_s - pair.before.time_s, pair.after.time_s - time_s) for pair in pairs]
         return cls(codes=codes, befores=befores, afters=afters, spans_s=np.array(spans_s, np.float32))
+
+    @cached_property
+    def each_row_s(self) -> Floats:
+        """The times to every light's plates, of every row of velocities, (light, 2, row)."""
+        if self.rows_s is not None:
+            return self.rows_s
+        return np.repeat(self.spans_s[:, :, None], self.shape[0], axis=2)
 
     @property
     def count(self) -> int:
@@ -87,11 +103,11 @@ class AllLights:
 
     def unlike(self, velocity: Floats) -> Floats:
         """Return how unlike all lights' plates are along velocities, shape (row, col), 0 to the number of lights."""
-        out = np.empty(self.shape, np.float32)
+        out, spans_s = np.empty(self.shape, np.float32), self.each_row_s
 
         def run(first: int, last: int) -> None:
             room = np.zeros((4, -(-self.shape[1] // EIGHT) * EIGHT), np.float32)
-            unlike_rows(self.befores, self.afters, self.spans_s, velocity, first, last, room, out)
+            unlike_rows(self.befores, self.afters, spans_s, velocity, first, last, room, out)
 
         over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
         return out
@@ -154,15 +170,15 @@ class AllLights:
     def _flows(self, ways: list[tuple[int, bool, tuple[float, float] | None]]) -> list[Floats]:
         def run(first: int, _: int) -> Floats:
             light, back, start_px = ways[first]
-            since_s, until_s = (float(span) for span in self.spans_s[light])
             one, other = self.codes[light]
             sign = -1.0 if back else 1.0
             start = None if start_px is None else (sign * start_px[0], sign * start_px[1])
             flow = flow_from(other, one, start) if back else flow_from(one, other, start)
-            round_s = since_s + until_s
+            since_s, until_s = self.each_row_s[light].astype(np.float64)
+            round_s = np.where(since_s + until_s > 0, since_s + until_s, np.inf)  # nothing is proposed of no time
             out = np.empty((2, *self.shape), np.float32)
-            share = np.float32((until_s if back else since_s) / round_s)
-            arriving_rows(flow, share, np.float32(sign / round_s), 0, out.shape[1], out)
+            shares: Floats = ((until_s if back else since_s) / round_s).astype(np.float32)
+            arriving_rows(flow, shares, (sign / round_s).astype(np.float32), 0, out.shape[1], out)
             return out
 
         return over_ranges(run, len(ways), each=1, threads=flow_threads())

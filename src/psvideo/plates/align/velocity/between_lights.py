@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.arrays import Codes8, Floats
+from psvideo.model.arrays import Codes8, Flags, Floats
 from psvideo.plates.align.velocity.brightness import light_of
 from psvideo.plates.align.velocity.flow import TOE, evenly_spread, flow_from, flow_threads
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, moved_rows
@@ -48,6 +48,7 @@ class BetweenLights:
     details: Codes8
     since_s: Floats
     shape: tuple[int, int]
+    rows_s: Floats | None = None
 
     @classmethod
     def of(cls, codes: Sequence[tuple[Codes8, Codes8]], spans_s: Floats, shape: tuple[int, int]) -> "BetweenLights":
@@ -64,9 +65,27 @@ class BetweenLights:
         over_ranges(sharpen, len(codes), each=1)
         return cls(details=details, since_s=since_s[order], shape=shape)
 
+    @classmethod
+    def of_rows(
+        cls, codes: Sequence[tuple[Codes8, Codes8]], rows_s: Floats, each_row_s: Floats, shape: tuple[int, int]
+    ) -> "BetweenLights":
+        """The same of plates whose rows show several instants: the times to them (light, 2, row), of every row of the
+        codes, and of every row of velocities."""
+        details = np.empty((len(codes), *codes[0][0].shape), np.uint8)
+
+        def sharpen(place: int, _: int) -> None:
+            first = _is_first(rows_s[place])
+            details[place] = edges_of(np.where(first[:, None], *codes[place]))
+
+        over_ranges(sharpen, len(codes), each=1)
+        near = np.stack([np.where(_is_first(one), one[0], -one[1]) for one in each_row_s])
+        return cls(details=details, since_s=near.mean(axis=1), shape=shape, rows_s=near)
+
     def proposed(self) -> list[Floats]:
         """Return the velocity, (2, row, col), in the middle of those by which one light's edges become those of the
-        next; none where all lights are of one flash."""
+        next; none where all lights are of one flash, or a plate's rows of several."""
+        if self.rows_s is not None:
+            return []
         last_s = float(self.since_s[0] - self.since_s[-1])
         steps = [
             place
@@ -85,7 +104,8 @@ class BetweenLights:
         step_s = since_s - float(self.since_s[place + 1])
         flow = flow_from(self.details[place], self.details[place + 1], coarser=COARSER)
         out = np.empty((2, *self.shape), np.float32)
-        arriving_rows(flow, np.float32(since_s / step_s), np.float32(1 / step_s), 0, self.shape[0], out)
+        each = (np.full(self.shape[0], value, np.float32) for value in (since_s / step_s, 1 / step_s))
+        arriving_rows(flow, *each, 0, self.shape[0], out)
         return out
 
     def disagree(self, velocity: Floats, window_px: int) -> Floats:
@@ -108,9 +128,17 @@ class BetweenLights:
 
     def _moved(self, place: int, velocity: Floats) -> Floats:
         out = np.empty([-(-length // STRIDE) for length in self.shape], np.float32)
-        moved_rows(self.details[place], self.since_s[place], velocity, STRIDE, 0, len(out), out)
+        since_s = np.full(self.shape[0], self.since_s[place], np.float32)
+        if self.rows_s is not None:
+            since_s = self.rows_s[place]
+        moved_rows(self.details[place], since_s, velocity, STRIDE, 0, len(out), out)
         out -= MIDDLE
         return out
+
+
+def _is_first(spans_s: Floats) -> Flags:
+    """Return which rows are nearer to the plate before than to the one after, by the times to both, (2, row)."""
+    return np.asarray(np.abs(spans_s[0]) <= np.abs(spans_s[1]))
 
 
 def _middle(few: Sequence[Floats]) -> Floats:

@@ -50,11 +50,22 @@ Choosing = Callable[[AllLights, Sequence[Floats], Followed, Flags], Followed]
 """What chooses again, by all lights, between velocities that flow proposes and what was found; what is still stays."""
 
 
-def followed_at(pairs: Sequence[Pair], time_s: float, *, others: int = 0, choose: Choosing | None = None) -> Followed:
+def followed_at(
+    pairs: Sequence[Pair],
+    time_s: float,
+    *,
+    others: int = 0,
+    choose: Choosing | None = None,
+    rows_s: Floats | None = None,
+) -> Followed:
     """Return how everything moves at an instant, which may lie before or after some lights' plates too. ``others`` is
-    the number of lights under which nothing moves; ``choose`` has the last word."""
-    lights = AllLights.of(pairs, time_s)
-    between = BetweenLights.of(lights.codes, lights.spans_s, lights.shape)
+    the number of lights under which nothing moves; ``choose`` has the last word. ``rows_s`` (light, 2, row) are the
+    times since and until the rows of the sketches, where these show several instants."""
+    lights = AllLights.of(pairs, time_s, rows_s)
+    if rows_s is None:
+        between = BetweenLights.of(lights.codes, lights.spans_s, lights.shape)
+    else:
+        between = BetweenLights.of_rows(lights.codes, rows_s, lights.each_row_s, lights.shape)
     none = np.zeros((2, *lights.shape), np.float32)
     wide_rest, fine_rest = lights.unlike_over_windows(none)
     proposals = lights.proposed() + between.proposed()

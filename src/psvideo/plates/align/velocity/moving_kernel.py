@@ -70,10 +70,10 @@ def unlike_rows(
 ) -> None:  # fmt: skip
     """Fill rows of ``out`` (row, col): how unlike the lights' plates before and after are at the ends of the way.
 
-    ``befores`` and ``afters`` are (light, row, col), of as many pixels as ``out`` or more, ``spans_s`` (light, 2) the
-    times since and until them, and ``velocity`` (2, row, col) in pixels of ``out`` per second; ``room`` (4, col) is to
-    work in, whose columns are a number of times EIGHT. Every light counts from 0 to 1, by Geman and McClure's function
-    of the difference: a shadow that passes under one light does not outvote the others.
+    ``befores`` and ``afters`` are (light, row, col), of as many pixels as ``out`` or more, ``spans_s`` (light, 2, row)
+    the times since and until them, and ``velocity`` (2, row, col) in pixels of ``out`` per second; ``room`` (4, col) is
+    to work in, whose columns are a number of times EIGHT. Every light counts from 0 to 1, by Geman and McClure's
+    function of the difference: a shadow that passes under one light does not outvote the others.
     """
     before, after, span, way, made = lent(befores), lent(afters), lent(spans_s), lent(velocity), lent(out)
     x, y, ones, others = lent(room)[0], lent(room)[1], lent(room)[2], lent(room)[3]
@@ -81,9 +81,9 @@ def unlike_rows(
         total = made[row]
         total[:] = ZERO
         for light in range(before.shape[0]):
-            _places(way, row, before.shape[1:], span[light, 0], x, y)
+            _places(way, row, before.shape[1:], span[light, 0, row], x, y)
             _codes_at(before[light], x, y, ones)
-            _places(way, row, before.shape[1:], -span[light, 1], x, y)
+            _places(way, row, before.shape[1:], -span[light, 1, row], x, y)
             _codes_at(after[light], x, y, others)
             for col in range(total.shape[0]):
                 square = (others[col] - ones[col]) * (others[col] - ones[col])
@@ -92,12 +92,12 @@ def unlike_rows(
 
 @FUSED.kept
 def moved_rows(
-    picture: Codes8, since_s: np.float32, velocity: Floats, stride: int, first: int, last: int, out: Floats
+    picture: Codes8, since_s: Floats, velocity: Floats, stride: int, first: int, last: int, out: Floats
 ) -> None:
-    """Fill rows of ``out`` (row, col) with what a picture of so many seconds ago, below 0 of so many ahead, shows along
-    velocities, (2, row, col) in their own pixels per second; ``out`` takes every ``stride``-th of them. The picture has
-    as many pixels as there are velocities or more."""
-    given, way, made = lent(picture), lent(velocity), lent(out)
+    """Fill rows of ``out`` (row, col) with what a picture of so many seconds ago (row,), below 0 of so many ahead, shows
+    along velocities, (2, row, col) in their own pixels per second; ``out`` takes every ``stride``-th of them. The
+    picture has as many pixels as there are velocities or more."""
+    given, way, made, ago = lent(picture), lent(velocity), lent(out), lent(since_s)
     high, wide = _steps(given.shape, way.shape[1:])
     for row in range(first, last):
         own_row = row * stride
@@ -106,21 +106,21 @@ def moved_rows(
             own_col = col * stride
             across = (np.float32(own_col) + HALF) * wide - HALF
             x, y = way[0, own_row, own_col] * wide, way[1, own_row, own_col] * high
-            made[row, col] = _between(given, down - y * since_s, across - x * since_s)
+            made[row, col] = _between(given, down - y * ago[own_row], across - x * ago[own_row])
 
 
 @FUSED.kept
-def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int, last: int, out: Floats) -> None:
-    """Fill rows of velocities, ``out`` (2, row, col), of what arrives at every pixel after a share of its flow.
+def arriving_rows(flow: Floats, shares: Floats, per_s: Floats, first: int, last: int, out: Floats) -> None:
+    """Fill rows of velocities, ``out`` (2, row, col), of what arrives at every pixel after a share of its flow (row,).
 
     ``flow`` (row, col, 2), of as many pixels as ``out`` or more, is known where things start, and asked for where they
-    arrive: the start is looked for step by step. It times ``per_s`` is the velocity, in pixels of ``out``.
+    arrive: the start is looked for step by step. It times ``per_s`` (row,) is the velocity, in pixels of ``out``.
     """
-    given, made = lent(flow), lent(out)
+    given, made, part, rate = lent(flow), lent(out), lent(shares), lent(per_s)
     rows, cols = given.shape[0], given.shape[1]
     high, wide = _steps(given.shape[:2], made.shape[1:])
     for row in range(first, last):
-        down = (np.float32(row) + HALF) * high - HALF
+        down, share = (np.float32(row) + HALF) * high - HALF, part[row]
         for col in range(made.shape[2]):
             across = (np.float32(col) + HALF) * wide - HALF
             x, y = given[int(down), int(across), 0], given[int(down), int(across), 1]
@@ -128,4 +128,4 @@ def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int
                 at_row = int(min(max(down - share * y + HALF, ZERO), np.float32(rows - 1)))
                 at_col = int(min(max(across - share * x + HALF, ZERO), np.float32(cols - 1)))
                 x, y = given[at_row, at_col, 0], given[at_row, at_col, 1]
-            made[0, row, col], made[1, row, col] = x * per_s / wide, y * per_s / high
+            made[0, row, col], made[1, row, col] = x * rate[row] / wide, y * rate[row] / high

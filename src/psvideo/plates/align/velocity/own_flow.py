@@ -54,7 +54,8 @@ class OwnFlow:
         ways = []
         for flow, share, sign in ((self.there, since_s / round_s, 1.0), (self.back, until_s / round_s, -1.0)):
             way = np.empty((2, *self.behind.shape), np.float32)
-            arriving_rows(flow, np.float32(share), np.float32(sign / round_s), 0, way.shape[1], way)
+            each = (np.full(way.shape[1], value, np.float32) for value in (share, sign / round_s))
+            arriving_rows(flow, *each, 0, way.shape[1], way)
             ways.append(way)
         return ways
 
