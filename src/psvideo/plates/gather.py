@@ -15,11 +15,12 @@ from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
 from psvideo.plates.align.lent.bringing import Bringing
 from psvideo.plates.align.open_shutter import with_open_shutter
+from psvideo.plates.align.plate_lamps import Lamps
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.flash_plates import clip_plates
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
+from psvideo.plates.nearest_rows import has_blind_time, waits_for, with_nearest_rows
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
 from psvideo.plates.several_lights.unmixed import slot_names, slot_plates, unmixed
@@ -98,9 +99,9 @@ def gather(
     if take.unmixing is None:
         check_separable(plan)
     borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
-    follows = aligning is not None and aligning.align != "none"
-    bringing = Bringing(lights=_names(take)) if borrows and follows else None
     turn = take.clip.turn
+    whites = dict[str, float]() if part is None else part.whites
+    bringing = _bringing(take, timing, aligning, whites) if borrows else None
     window = None if each_window is None else lambda found: each_window(upright_window(found, turn))
     made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=window, unseen=borrows)
     plates = _named_plates(take, timing, _shown(made, each_flash), start_number=start_number)
@@ -118,12 +119,26 @@ def gather(
         first=start_number,
         with_ambient=with_ambient,
         schedule=scheduled(take, timing, aligning, start_number=start_number),
-        whites=None if part is None else part.whites,
+        whites=whites,
         put_by=None if take.kept is None else take.kept.passing_codes,
         coded=take.clip.is_movie,
     )
     rounds = _apart(rounds, take)
     return with_open_shutter(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
+
+
+def _bringing(take: Take, timing: Timing, aligning: Aligning | None, whites: dict[str, float]) -> Bringing | None:
+    """Return what moves rows that other flashes lend; None where motion is not asked for."""
+    if aligning is None or aligning.align == "none":
+        return None
+    names = _names(take)
+    sideways = take.clip.turn.transposed  # near lights shine on what is upright
+    return Bringing(
+        lights=names,
+        waits=waits_for(timed_camera(take.plan, timing)),
+        lamps=None if sideways else Lamps.of(aligning.lights, names, aligning.ground),
+        whites=whites,
+    )
 
 
 def _names(take: Take) -> tuple[str, ...]:

@@ -6,9 +6,10 @@ the same light that is nearest in time; ``LightPlate.flashed_s`` says which. Not
 such rows is a matter for alignment, which goes by the rows that a plate's own flash showed.
 """
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,42 +37,46 @@ def has_blind_time(camera: Camera) -> bool:
     return abs(camera.exposure_s / camera.frame_period_s - 1) > BLIND
 
 
+def waits_for(camera: Camera) -> int:
+    """Return how many later plates of a light show every row, as a rule: as often as a row's light is caught."""
+    return min(max(math.ceil(camera.frame_period_s / camera.exposure_s - BLIND), 1), MOST_LATER)
+
+
 def with_nearest_rows(plates: Iterable[LightPlate], bringing: Bringing | None = None) -> Iterator[LightPlate]:
     """Yield plates in their order, the rows that they lack taken from the nearest plates of the same light.
 
     Held are the rows that the waiting plates' own flashes showed, and the latest that is known of each row of every
-    light. Rows that no flash within reach showed stay unseen.
+    light. Rows that no flash within reach showed stay unseen. ``bringing`` moves rows of what moves to the instant of
+    the plate that lacks them; without it they come as they are.
     """
-    waiting: deque[_Waiting] = deque()
-    known: dict[str, LightPlate] = {}
+    held = _Held(bringing=bringing)
     for plate in plates:
-        if bringing is not None:
-            bringing.look_at(plate)
-        waiting.append(_Waiting.of(plate))
+        held.take(plate)
         del plate
-        while _can_go(waiting, known):
-            yield _released(waiting, known, bringing)
-    while waiting:
-        yield _released(waiting, known, bringing)
+        while held.can_go():
+            yield held.released()
+    while held.waiting:
+        yield held.released()
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Waiting:
-    """A plate; where its own flash did not show all of it, only the ``rows`` are held that this showed, and ``plate``
-    has no picture."""
+    """A plate, and how many came before it; where its own flash did not show all of it, only the ``rows`` are held that
+    this showed, and ``plate`` has no picture."""
 
     plate: LightPlate
     rows: NDArray[np.float32] | None
     shape: tuple[int, ...]
+    place: int
 
     @classmethod
-    def of(cls, plate: LightPlate) -> "_Waiting":
+    def of(cls, plate: LightPlate, place: int) -> "_Waiting":
         """Hold a plate."""
         plate = with_filled(plate)
         if plate.rows_seen.all():
-            return cls(plate=plate, rows=None, shape=plate.shape)
+            return cls(plate=plate, rows=None, shape=plate.shape, place=place)
         rows = plate.picture.rows(np.flatnonzero(plate.rows_seen))
-        return cls(plate=replace(plate, picture=mixture_of(rows[:0])), rows=rows, shape=plate.shape)
+        return cls(plate=replace(plate, picture=mixture_of(rows[:0])), rows=rows, shape=plate.shape, place=place)
 
     def given(self) -> LightPlate:
         """Return the plate with its own rows, the others 0."""
@@ -88,37 +93,108 @@ class _Waiting:
         else:
             image[wanted] = self.rows[wanted[self.plate.rows_seen]]
 
-
-def _later(waiting: deque[_Waiting]) -> list[_Waiting]:
-    """Return the later plates of the first one's light, in order."""
-    first = waiting[0].plate.light
-    return [one for n, one in enumerate(waiting) if n and one.plate.light == first]
-
-
-def _can_go(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> bool:
-    """Return whether nothing nearer can come for the first plate, or it has waited enough."""
-    if not waiting:
-        return False
-    seen, later = waiting[0].plate.rows_seen.copy(), _later(waiting)
-    for one in later:
-        seen |= one.plate.rows_seen
-    earlier = known.get(waiting[0].plate.light)
-    if earlier is not None and len(later) >= LATER:
-        seen |= earlier.rows_seen
-    return bool(seen.all()) or len(later) >= MOST_LATER
+    def lent(self) -> list[LentRows]:
+        """Return the pieces of rows that its own flash showed."""
+        if self.rows is None:
+            return _lent(self.plate)
+        places, rows, time_s = np.flatnonzero(self.plate.rows_seen), self.rows, self.plate.time_s
+        some = _pieces(places - np.arange(len(places)))
+        return [LentRows(image=rows[one], first=int(places[one.start]), time_s=time_s) for one in some]
 
 
-def _released(waiting: deque[_Waiting], known: dict[str, LightPlate], bringing: Bringing | None) -> LightPlate:
-    """Return the first plate with the rows that it lacks from the nearest others, and note what it showed itself."""
-    later, first = _later(waiting), waiting.popleft()
-    own = first.given()
-    earlier = known.get(own.light)
-    known[own.light] = own if earlier is None else _filled(own, earlier, ~own.rows_seen & earlier.rows_seen)
-    if own.rows_seen.all():
-        return own
-    found = known[own.light]
-    motion = None if bringing is None or own.filled is not None else bringing.motion_in(own.number)
-    lent = [] if motion is None else [*_lent(earlier), *(run for one in later for run in _lent(one.given()))]
+@dataclass(kw_only=True)
+class _Held:
+    """What waits, in order, the latest that is ``known`` of every light, how many plates ``came``, and the place of the
+    last one that rows are taken from as they are, ``until``: who waits longer for rows that are moved takes none from
+    farther away where nothing moves."""
+
+    bringing: Bringing | None
+    waiting: deque[_Waiting] = field(default_factory=deque)
+    known: dict[str, LightPlate] = field(default_factory=dict)
+    came: int = 0
+    until: int = 0
+
+    def take(self, plate: LightPlate) -> None:
+        """Hold one more plate."""
+        if self.bringing is not None:
+            self.bringing.look_at(plate)
+        self.waiting.append(_Waiting.of(plate, self.came))
+        self.came += 1
+
+    def can_go(self) -> bool:
+        """Return whether nothing nearer can come for the first plate, or it has waited enough."""
+        if not self.waiting or self._enough(self.waiting[0]) is None:
+            return False
+        if self.bringing is None:
+            return True
+        first = self.waiting[0]
+        later = self._later(first)
+        if len(later) < self.bringing.waits and not first.plate.rows_seen.all():
+            return False
+        return self._has_whites() or len(later) > MOST_LATER
+
+    def released(self) -> LightPlate:
+        """Return the first plate with the rows that it lacks from the nearest others, and note what it showed."""
+        self._has_whites(at_last=True)
+        first, enough = self.waiting[0], self._enough(self.waiting[0])
+        self.until = max(self.until, self.came if enough is None else enough)
+        later = self._later(first)
+        self.waiting.popleft()
+        own, earlier = first.given(), self.known.get(first.plate.light)
+        self.known[own.light] = own if earlier is None else _filled(own, earlier, ~own.rows_seen & earlier.rows_seen)
+        if own.rows_seen.all():
+            return own
+        made = _with_rows(own, self.known[own.light], [one for one in later if one.place <= self.until])
+        if self.bringing is None or own.light not in self.bringing.lights or own.filled is not None:
+            return made
+        motion = self.bringing.motion_in(own.number)
+        if motion is None:
+            return made
+        lent = [*_lent(earlier), *(rows for one in later for rows in one.lent())]
+        return brought(made, own.rows_seen, lent, motion, self.bringing.reach_s(own.light))
+
+    def _later(self, first: _Waiting) -> list[_Waiting]:
+        """Return the later plates of a plate's light, in order."""
+        return [one for one in self.waiting if one.plate.light == first.plate.light and one.place > first.place]
+
+    def _enough(self, first: _Waiting) -> int | None:
+        """Return the place of the plate with which a plate of its light, and those after it, lack nothing that is
+        nearer, or have waited enough; None where that is still to come."""
+        seen, earlier = first.plate.rows_seen.copy(), self.known.get(first.plate.light)
+        if seen.all():
+            return first.place
+        for count, one in enumerate(self._later(first), start=1):
+            seen |= one.plate.rows_seen
+            if earlier is not None and count >= LATER:
+                seen |= earlier.rows_seen
+            if seen.all() or count >= MOST_LATER:
+                return one.place
+        return None
+
+    def _has_whites(self, *, at_last: bool = False) -> bool:
+        """Return whether the white of every light's sketches is known: that of its first plate with the rows that this
+        lacks; note it once it is. ``at_last`` takes what there is."""
+        if self.bringing is None:
+            return True
+        lacking = [light for light in self.bringing.lights if light not in self.bringing.whites]
+        firsts = [next((one for one in self.waiting if one.plate.light == light), None) for light in lacking]
+        made = list[LightPlate]()
+        for first in firsts:
+            enough = None if first is None else self._enough(first)
+            if first is None or (enough is None and not at_last):
+                if not at_last:
+                    return False
+                continue
+            until = max(self.until, self.came if enough is None else enough)
+            own = first.given()
+            made.append(_with_rows(own, own, [one for one in self._later(first) if one.place <= until]))
+        if made:
+            self.bringing.begin(made, [one.given() for one in self.waiting])
+        return True
+
+
+def _with_rows(own: LightPlate, found: LightPlate, later: list[_Waiting]) -> LightPlate:
+    """Return a plate with the rows that were ``found`` of it, or those of later ones where they are nearer."""
     image, shown_s, seen, full = found.image.copy(), found.flashed_s.copy(), found.rows_seen.copy(), found.filled
     for one in later:
         nearer = ~seen | (abs(one.plate.time_s - own.time_s) < np.abs(shown_s - own.time_s))
@@ -126,8 +202,7 @@ def _released(waiting: deque[_Waiting], known: dict[str, LightPlate], bringing: 
         one.put(image, wanted)
         shown_s[wanted], seen[wanted] = one.plate.time_s, True
         full = _full_of(full, one.plate.filled, wanted)
-    filled = replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s, filled=full)
-    return filled if motion is None else brought(filled, own.rows_seen, lent, motion)
+    return replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s, filled=full)
 
 
 def _lent(plate: LightPlate | None) -> list[LentRows]:
@@ -135,9 +210,21 @@ def _lent(plate: LightPlate | None) -> list[LentRows]:
     if plate is None:
         return []
     image, shown_s, seen = plate.image, plate.flashed_s, plate.rows_seen
-    ends = np.flatnonzero((np.diff(shown_s) != 0) | (np.diff(seen.astype(np.int8)) != 0)) + 1
-    runs = zip([0, *ends], [*ends, len(seen)], strict=True)
-    return [LentRows(image=image[a:b], first=int(a), time_s=float(shown_s[a])) for a, b in runs if seen[a]]
+    return [
+        LentRows(image=image[some], first=some.start, time_s=float(shown_s[some.start]))
+        for some in _pieces(np.where(seen, shown_s, np.inf))
+        if seen[some.start]
+    ]
+
+
+def _pieces(values: Doubles) -> list[slice]:
+    """Return the longest pieces of one value each.
+
+    >>> _pieces(np.array([1.0, 1.0, 2.0]))
+    [slice(0, 2, None), slice(2, 3, None)]
+    """
+    ends = [*(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
+    return [slice(first, last) for first, last in zip([0, *ends[:-1]], ends, strict=True)]
 
 
 def _full_of(own: Bytes | None, other: Bytes | None, rows: Flags) -> Bytes | None:

@@ -36,7 +36,7 @@ AROUND, FEW = 3, np.float32(0.02)
 MOST, AS_UNLIKE = np.float32(0.25), np.float32(1.15)
 """What is not lit by all goes along where more than the first around it was chosen here, and plates are no more unlike
 along it than by the second."""
-LEAST = np.float32(1e-3)
+LEAST, LEAST_SPAN_S = np.float32(1e-3), np.float32(1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,6 +223,8 @@ class BySurface:
     def _light(self, lights: AllLights, light: int, ways: tuple[Floats, Floats | None], stride: int) -> Floats:
         """Return a light's two plates along a velocity and its bend, mixed by how near they are, as shares of white
         (row, col)."""
+        if lights.rows_s is not None:
+            return self._light_of_rows(lights, light, ways[0], stride)
         plates, (velocity, bend) = self.plates(lights, light), ways
         if len(plates) == 1:
             size = lights.shape[::-1]
@@ -233,6 +235,19 @@ class BySurface:
             out, way = np.empty_like(total), mean_velocity(velocity, bend, plate.span_s)
             moved_rows(plate.codes, np.full(way.shape[1], plate.span_s, np.float32), way, stride, 0, len(out), out)
             total += np.float32(plate.counts) * light_of(out)
+        return total * self.lamps.evening(light, total.shape)
+
+    def _light_of_rows(self, lights: AllLights, light: int, velocity: Floats, stride: int) -> Floats:
+        """Return the same of plates whose rows show several instants; of all lights there are two."""
+        place, shape = self.places[light], [-(-length // stride) for length in lights.shape]
+        if place is None or lights.rows_s is None:
+            raise ValueError("a light lacks plates whose rows have times of their own")
+        since_s, until_s = lights.rows_s[place]
+        late = np.clip(since_s / np.maximum(since_s + until_s, LEAST_SPAN_S), 0, 1)
+        total, out = np.zeros((2, *shape), np.float32)
+        for codes, span_s, counts in zip(lights.codes[place], (since_s, -until_s), (1 - late, late), strict=True):
+            moved_rows(codes, span_s, velocity, stride, 0, len(out), out)
+            total += counts[::stride, None] * light_of(out)
         return total * self.lamps.evening(light, total.shape)
 
 

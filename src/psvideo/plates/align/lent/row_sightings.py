@@ -5,13 +5,16 @@ the last flash that showed it up to the instant, and of the other the first one 
 by which flow between the two becomes a velocity.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from psvideo.model.arrays import Codes8, Floats
+from psvideo.model.arrays import Flags, Floats
+from psvideo.plates.align.by_surface import BySurface
+from psvideo.plates.align.plate_lamps import Lamps
+from psvideo.plates.align.velocity.all_lights import AllLights
 from psvideo.plates.align.velocity.brightness import evened
 from psvideo.plates.align.velocity.flow import BLOCK_PX, Sketch, changed
 from psvideo.plates.align.velocity.followed import Followed, Pair
@@ -67,12 +70,19 @@ def _made_up(shots: Sequence[Sketch], which: np.ndarray, known: np.ndarray) -> S
     )
 
 
-def motion_by_rows(shots: Sequence[Sequence[Sketch]], time_s: float) -> Followed | None:
-    """Return how everything moves at an instant by the sketches of every light; None where nothing changes."""
-    found = [row_pair(of_light, time_s) for of_light in shots if of_light]
-    pairs = [one for one in found if one is not None]
-    if not any(changed(one.pair.before, one.pair.after).any() for one in pairs):
+def motion_by_rows(shots: Mapping[str, Sequence[Sketch]], time_s: float, lamps: Lamps | None) -> Followed | None:
+    """Return how everything moves at an instant by the sketches of every light, which shine as the ``lamps``; None
+    where nothing changes."""
+    found = {light: row_pair(of_light, time_s) for light, of_light in shots.items() if of_light}
+    known = {light: one for light, one in found.items() if one is not None}
+    if not any(changed(one.pair.before, one.pair.after).any() for one in known.values()):
         return None
-    rows_s = np.stack([one.spans_s for one in pairs])
-    motion = followed_at([one.pair for one in pairs], time_s, rows_s=rows_s)
+    pairs = {light: one.pair for light, one in known.items()}
+    surface = BySurface.of(lamps, pairs, {}) if len(pairs) == len(shots) else None
+
+    def choose(lights: AllLights, proposals: Sequence[Floats], found: Followed, still: Flags) -> Followed:
+        return found if surface is None else surface.chosen(lights, proposals, found, still)
+
+    rows_s = np.stack([one.spans_s for one in known.values()])
+    motion = followed_at([*pairs.values()], time_s, choose=choose, rows_s=rows_s)
     return motion if motion.moves.any() else None

@@ -140,14 +140,18 @@ class AllLights:
             one, other = self.codes[light]
             change = cv2.GaussianBlur(cv2.subtract(other, one, dtype=cv2.CV_32F), (0, 0), FINEST_PX)
             little = mean_over(np.asarray(change * change, np.float32), STILL_PX) < STILL_CODES**2
-            return np.asarray(little[: rows : self.step, : cols : self.step])
+            known = True if self.rows_s is None else self.rows_s[light].any(axis=0)[:, None]
+            return np.asarray(little[: rows : self.step, : cols : self.step] & known)
 
         return np.asarray(np.sum(over_ranges(still, self.count, each=1), axis=0, dtype=np.int16))
 
     def at_rest(self, unchanged: NDArray[np.int16], others: int) -> Flags:
         """Return what rests, by under how many lights it is ``unchanged``, both (row, col), among them ``others`` under
         which nothing moves."""
-        return np.asarray(unchanged >= max(STILL_LIGHTS, STILL_SHARE * (self.count + others)))
+        if self.rows_s is None:
+            return np.asarray(unchanged >= max(STILL_LIGHTS, STILL_SHARE * (self.count + others)))
+        known = self.rows_s.any(axis=1).sum(axis=0) + others
+        return np.asarray(unchanged >= np.maximum(STILL_LIGHTS, STILL_SHARE * known)[:, None])
 
     def proposed(self) -> list[Floats]:
         """Return the velocities that flow proposes: both ways of few lights, one way of each of more."""
