@@ -178,19 +178,18 @@ class _Held:
             return True
         lacking = [light for light in self.bringing.lights if light not in self.bringing.whites]
         firsts = [next((one for one in self.waiting if one.plate.light == light), None) for light in lacking]
-        made = list[LightPlate]()
-        for first in firsts:
-            enough = None if first is None else self._enough(first)
-            if first is None or (enough is None and not at_last):
-                if not at_last:
-                    return False
-                continue
-            until = max(self.until, self.came if enough is None else enough)
-            own = first.given()
-            made.append(_with_rows(own, own, [one for one in self._later(first) if one.place <= until]))
-        if made:
-            self.bringing.begin(made, [one.given() for one in self.waiting])
+        here = [one for one in firsts if one is not None]
+        if not at_last and (len(here) < len(lacking) or any(self._enough(one) is None for one in here)):
+            return False
+        if here:
+            self.bringing.begin(map(self._whole, here), (one.given() for one in self.waiting))
         return True
+
+    def _whole(self, first: _Waiting) -> LightPlate:
+        """Return the first plate of a light with the rows that it lacks."""
+        enough, own = self._enough(first), first.given()
+        until = max(self.until, self.came if enough is None else enough)
+        return _with_rows(own, own, [one for one in self._later(first) if one.place <= until])
 
 
 def _with_rows(own: LightPlate, found: LightPlate, later: list[_Waiting]) -> LightPlate:

@@ -8,7 +8,14 @@ from psvideo.model.cost.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judge.of_ambient import NOTICED
-from psvideo.report.judge.of_part_of_rows import MOST_LENT_PX, lent, round_s, seen_in_part, unknown_in_part
+from psvideo.report.judge.of_part_of_rows import (
+    MOST_APART_PX,
+    lent,
+    rarer,
+    round_s,
+    seen_in_part,
+    unknown_in_part,
+)
 from psvideo.report.judge.of_rows import is_blind
 from psvideo.report.judge.of_validity import HARDLY_VALID
 from psvideo.report.judge.of_what_moves import what_moves
@@ -55,8 +62,10 @@ def motion(
     speed, most_px = float(np.quantile(speeds, OFTEN)), max(speeds) * flash_s
     step_px = speed * flash_s
     if blind and (lent_px := speed * round_s(plan, timing)) > FAST_PX:
-        grave = lent_px > MOST_LENT_PX and share > FEW_MOVE and (not aligned or _hardly_any_left(observed))
-        found = lent(f"{_what_moves(share)} moves, by up to {step_px:.1f} px", timing, lent_px=lent_px, grave=grave)
+        far = step_px * rarer(timing) > MOST_APART_PX and not aligned
+        grave = share > FEW_MOVE and (far or (aligned and _hardly_any_left(observed)))
+        moves = f"{_what_moves(share)} moves, by up to {step_px:.1f} px"
+        found = lent(moves, timing, lent_px=lent_px, grave=grave, aligned=aligned)
         return replace(found, found=found.found + _unfrozen(plan, timing, observed, speed))
     if step_px <= FAST_PX:
         return Judgement(subject="motion", grade="good", found=_slow(step_px, most_px))

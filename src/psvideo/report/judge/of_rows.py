@@ -167,7 +167,7 @@ def _blind(plan: Plan, timing: Timing, rows: _Rows) -> Iterator[Judgement]:
             subject="rows",
             grade="doubtful",
             found=f"{shutter.capitalize()}: {shares} % of a round's rows come from other rounds. What "
-            f"stands still loses nothing by it, what moves is lost there or comes out wrong.{_lacking(rows)}",
+            f"stands still loses nothing by it, of what moves more is lost than at 360 degrees.{_lacking(rows)}",
             advice="Shoot at 360 degrees" + (", or film longer." if _too_short(rows) else "."),
         )
     elif unseen > MOST_UNSEEN:

@@ -1,6 +1,6 @@
 """How everything moves in every round of plates that lack rows, by what the flashes around it showed of theirs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,11 +29,12 @@ class Bringing:
     sketches: dict[tuple[str, int], Sketch] = field(default_factory=dict)
     motions: dict[int, Followed | None] = field(default_factory=dict)
 
-    def begin(self, firsts: Sequence[LightPlate], waiting: Sequence[LightPlate]) -> None:
+    def begin(self, firsts: Iterable[LightPlate], waiting: Iterable[LightPlate]) -> None:
         """Note the whites of lights' first plates, which are whole, and sketch what waits of these."""
         self.whites |= {plate.light: white_of(plate) for plate in firsts}
         for plate in waiting:
             self.look_at(plate)
+            del plate  # none is held while the next one is made
 
     def look_at(self, plate: LightPlate) -> None:
         """Sketch a plate of which only its own rows are there; for now it is left out where its white is not known."""

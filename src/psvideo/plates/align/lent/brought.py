@@ -7,6 +7,7 @@ something else. What no flash shows is not seen.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -16,7 +17,6 @@ from psvideo.model.arrays import Flags, Floats, Image
 from psvideo.model.channels import brightest_channel
 from psvideo.plates.align.velocity.followed import Followed
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixing.mixture import mixture_of
 
 ALIKE, DARK = np.float32(0.15), np.float32(0.01)
 """Two flashes that differ by more than the first, as a share of the brighter, and the second of full light, do not show
@@ -33,11 +33,17 @@ class LentRows:
     first: int
     time_s: float
 
+    @cached_property
+    def most(self) -> float:
+        """The most that they show."""
+        return float(self.image.max())
+
 
 def brought(plate: LightPlate, own: Flags, lent: Sequence[LentRows], motion: Followed, reach_s: float) -> LightPlate:
     """Return a plate whose rows that are not its ``own`` (row,) are moved to its instant, of flashes no farther away
-    than ``reach_s``."""
-    image, seen = plate.image.copy(), np.array(plate.pixels_seen)
+    than ``reach_s``. They are written into the picture that it has, which lies in memory and is nobody else's: a copy
+    would take as much again."""
+    image, seen = plate.image, np.array(plate.pixels_seen)
     near = sorted((one for one in lent if abs(one.time_s - plate.time_s) <= reach_s), key=lambda one: one.time_s)
     sides = [one for one in near if one.time_s < plate.time_s][::-1], [one for one in near if one.time_s > plate.time_s]
     ways_px = reach_s * np.abs(motion.velocity).max(axis=(1, 2)) * motion.step
@@ -51,7 +57,7 @@ def brought(plate: LightPlate, own: Flags, lent: Sequence[LentRows], motion: Fol
 
     over_ranges(fill, len(own), each=BAND_ROWS)
     hidden = not seen[plate.rows_seen].all()
-    return replace(plate, picture=mixture_of(image), seen=seen if hidden else plate.seen, brought=True)
+    return replace(plate, seen=seen if hidden else plate.seen, brought=True)
 
 
 def _wider(motion: Followed, ways_px: Floats) -> Flags:
@@ -120,7 +126,7 @@ class _Piece:
             within = left & _inside(down, len(one.image)) & _inside(across, self.plate.shape[1])
             if within.any():
                 within &= self.moves | ~self._hidden(span_s)
-                made[within] = _between(one.image, across, down, self.plate.saturation)[within]
+                made[within] = _between(one, across, down, self.plate.saturation)[within]
                 away_s[within] = np.abs(span_s)
                 left &= ~within
             if not left.any():
@@ -129,8 +135,9 @@ class _Piece:
 
     def _hidden(self, span_s: Floats | np.float32) -> Flags:
         """Return what stands and was hidden so long before the instant by what moves."""
-        there = _moves(self.motion, self.plate, self.x + span_s * self.velocity[0], self.y + span_s * self.velocity[1])
-        return there & ~self.moves
+        since_s = span_s - np.float32(self.plate.time_s - self.motion.time_s)  # what moves is known of then
+        x, y = self.x + since_s * self.velocity[0], self.y + since_s * self.velocity[1]
+        return _moves(self.motion, self.plate, x, y) & ~self.moves
 
     def _blended(self, before: tuple[Image, Floats], after: tuple[Image, Floats]) -> Image:
         """Return both by how near they are, or the nearer one where they show different things."""
@@ -148,12 +155,12 @@ def _inside(places: Floats, size: int) -> Flags:
     return np.asarray((places >= -HALF) & (places <= np.float32(size) - HALF))
 
 
-def _between(image: Image, across: Floats, down: Floats, saturation: float) -> Image:
+def _between(lent: LentRows, across: Floats, down: Floats, saturation: float) -> Image:
     """Return a picture between its pixels; what lies beside clipped ones is clipped."""
-    made = cv2.remap(image, across, down, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    if image.max() < saturation:
+    made = cv2.remap(lent.image, across, down, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    if lent.most < saturation:
         return np.asarray(made, np.float32)
-    full = (image >= saturation).astype(np.float32)
+    full = (lent.image >= saturation).astype(np.float32)
     near = cv2.remap(full, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.where(near > 0, np.maximum(made, np.float32(saturation)), made)
 
