@@ -155,6 +155,16 @@ def test_plates_of_what_moves_come_out_at_their_own_instants() -> None:
     assert np.mean(off) < 0.25 * np.mean(off_as_they_are)
 
 
+def test_a_flash_that_no_row_saw_lends_nothing_and_gets_all() -> None:
+    plates = _film(1.0)
+    none = np.zeros(ROWS, np.bool_)
+    plates[13] = replace(plates[13], seen=none, picture=mixture_of(np.zeros((ROWS, COLS), np.float32)))
+    found = list(with_nearest_rows(plates, Bringing(lights=LIGHTS, waits=2)))
+    assert len(found) == len(plates)
+    assert found[13].rows_seen.all()
+    assert found[13].brought
+
+
 @pytest.mark.parametrize(("shutter", "waits"), [(0.9, 2), (0.5, 2), (0.25, 4), (0.02, MOST_LATER)])
 def test_a_plate_waits_until_every_row_saw_its_light(shutter: float, waits: int) -> None:
     camera = Camera(width_px=1, height_px=1, fps=Fraction(100), exposure_s=shutter * 0.01, readout_s=0.0)

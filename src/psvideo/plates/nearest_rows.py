@@ -223,7 +223,7 @@ def _pieces(values: Doubles) -> list[slice]:
     [slice(0, 2, None), slice(2, 3, None)]
     """
     ends = [*(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
-    return [slice(first, last) for first, last in zip([0, *ends[:-1]], ends, strict=True)]
+    return [slice(first, last) for first, last in zip([0, *ends[:-1]], ends, strict=True) if first < last]
 
 
 def _full_of(own: Bytes | None, other: Bytes | None, rows: Flags) -> Bytes | None:
