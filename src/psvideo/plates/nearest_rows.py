@@ -2,8 +2,8 @@
 
 Below 360 degrees every row is blind for a part of every frame, so that each flash is missed by some rows. The dark row
 rolls, and the light's next flashes, or those before, show what this one missed. A row is taken whole from the flash of
-the same light that is nearest in time; ``LightPlate.flashed_s`` says which. Nothing is moved: what is not at rest in
-such rows is a matter for alignment, which goes by the rows that a plate's own flash showed.
+the same light that is nearest in time; ``LightPlate.flashed_s`` says which. Where something moves, ``align.lent``
+brings such rows to the plate's own instant.
 """
 
 import math
@@ -12,15 +12,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.model.arrays import Bytes, Doubles, Flags
 from psvideo.model.camera import Camera
 from psvideo.plates.align.lent.bringing import Bringing
-from psvideo.plates.align.lent.brought import LentRows, brought
+from psvideo.plates.align.lent.brought import brought
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixing.mixture import mixture_of
-from psvideo.plates.several_lights.clipped_flashes import with_filled
+from psvideo.plates.waiting_plate import WaitingPlate, pieces_lent
 
 LATER, MOST_LATER = 2, 8
 """A plate waits for later ones of its light: for two where earlier ones showed what it lacks, for eight at a clip's
@@ -59,49 +58,6 @@ def with_nearest_rows(plates: Iterable[LightPlate], bringing: Bringing | None = 
         yield held.released()
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Waiting:
-    """A plate, and how many came before it; where its own flash did not show all of it, only the ``rows`` are held that
-    this showed, and ``plate`` has no picture."""
-
-    plate: LightPlate
-    rows: NDArray[np.float32] | None
-    shape: tuple[int, ...]
-    place: int
-
-    @classmethod
-    def of(cls, plate: LightPlate, place: int) -> "_Waiting":
-        """Hold a plate."""
-        plate = with_filled(plate)
-        if plate.rows_seen.all():
-            return cls(plate=plate, rows=None, shape=plate.shape, place=place)
-        rows = plate.picture.rows(np.flatnonzero(plate.rows_seen))
-        return cls(plate=replace(plate, picture=mixture_of(rows[:0])), rows=rows, shape=plate.shape, place=place)
-
-    def given(self) -> LightPlate:
-        """Return the plate with its own rows, the others 0."""
-        if self.rows is None:
-            return self.plate
-        image = np.zeros(self.shape, np.float32)
-        image[self.plate.rows_seen] = self.rows
-        return replace(self.plate, picture=mixture_of(image))
-
-    def put(self, image: NDArray[np.float32], wanted: Flags) -> None:
-        """Write those of its rows that are wanted."""
-        if self.rows is None:
-            image[wanted] = self.plate.picture.rows(np.flatnonzero(wanted))
-        else:
-            image[wanted] = self.rows[wanted[self.plate.rows_seen]]
-
-    def lent(self) -> list[LentRows]:
-        """Return the pieces of rows that its own flash showed."""
-        if self.rows is None:
-            return _lent(self.plate)
-        places, rows, time_s = np.flatnonzero(self.plate.rows_seen), self.rows, self.plate.time_s
-        some = _pieces(places - np.arange(len(places)))
-        return [LentRows(image=rows[one], first=int(places[one.start]), time_s=time_s) for one in some]
-
-
 @dataclass(kw_only=True)
 class _Held:
     """What waits, in order, the latest that is ``known`` of every light, how many plates ``came``, and the place of the
@@ -109,7 +65,7 @@ class _Held:
     farther away where nothing moves."""
 
     bringing: Bringing | None
-    waiting: deque[_Waiting] = field(default_factory=deque)
+    waiting: deque[WaitingPlate] = field(default_factory=deque)
     known: dict[str, LightPlate] = field(default_factory=dict)
     came: int = 0
     until: int = 0
@@ -118,7 +74,7 @@ class _Held:
         """Hold one more plate."""
         if self.bringing is not None:
             self.bringing.look_at(plate)
-        self.waiting.append(_Waiting.of(plate, self.came))
+        self.waiting.append(WaitingPlate.of(plate, self.came))
         self.came += 1
 
     def can_go(self) -> bool:
@@ -150,14 +106,14 @@ class _Held:
         motion = self.bringing.motion_in(own.number)
         if motion is None:
             return made
-        lent = [*_lent(earlier), *(rows for one in later for rows in one.lent())]
+        lent = [*pieces_lent(earlier), *(rows for one in later for rows in one.lent())]
         return brought(made, own.rows_seen, lent, motion, self.bringing.reach_s(own.light))
 
-    def _later(self, first: _Waiting) -> list[_Waiting]:
+    def _later(self, first: WaitingPlate) -> list[WaitingPlate]:
         """Return the later plates of a plate's light, in order."""
         return [one for one in self.waiting if one.plate.light == first.plate.light and one.place > first.place]
 
-    def _enough(self, first: _Waiting) -> int | None:
+    def _enough(self, first: WaitingPlate) -> int | None:
         """Return the place of the plate with which a plate of its light, and those after it, lack nothing that is
         nearer, or have waited enough; None where that is still to come."""
         seen, earlier = first.plate.rows_seen.copy(), self.known.get(first.plate.light)
@@ -185,14 +141,14 @@ class _Held:
             self.bringing.begin(map(self._whole, here), (one.given() for one in self.waiting))
         return True
 
-    def _whole(self, first: _Waiting) -> LightPlate:
+    def _whole(self, first: WaitingPlate) -> LightPlate:
         """Return the first plate of a light with the rows that it lacks."""
         enough, own = self._enough(first), first.given()
         until = max(self.until, self.came if enough is None else enough)
         return _with_rows(own, own, [one for one in self._later(first) if one.place <= until])
 
 
-def _with_rows(own: LightPlate, found: LightPlate, later: list[_Waiting]) -> LightPlate:
+def _with_rows(own: LightPlate, found: LightPlate, later: list[WaitingPlate]) -> LightPlate:
     """Return a plate with the rows that were ``found`` of it, or those of later ones where they are nearer."""
     image, shown_s, seen, full = found.image.copy(), found.flashed_s.copy(), found.rows_seen.copy(), found.filled
     for one in later:
@@ -202,28 +158,6 @@ def _with_rows(own: LightPlate, found: LightPlate, later: list[_Waiting]) -> Lig
         shown_s[wanted], seen[wanted] = one.plate.time_s, True
         full = _full_of(full, one.plate.filled, wanted)
     return replace(own, picture=mixture_of(image), seen=seen, shown_s=shown_s, filled=full)
-
-
-def _lent(plate: LightPlate | None) -> list[LentRows]:
-    """Return the pieces of rows that a plate shows, each of one flash."""
-    if plate is None:
-        return []
-    image, shown_s, seen = plate.image, plate.flashed_s, plate.rows_seen
-    return [
-        LentRows(image=image[some], first=some.start, time_s=float(shown_s[some.start]))
-        for some in _pieces(np.where(seen, shown_s, np.inf))
-        if seen[some.start]
-    ]
-
-
-def _pieces(values: Doubles) -> list[slice]:
-    """Return the longest pieces of one value each.
-
-    >>> _pieces(np.array([1.0, 1.0, 2.0]))
-    [slice(0, 2, None), slice(2, 3, None)]
-    """
-    ends = [*(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
-    return [slice(first, last) for first, last in zip([0, *ends[:-1]], ends, strict=True) if first < last]
 
 
 def _full_of(own: Bytes | None, other: Bytes | None, rows: Flags) -> Bytes | None:

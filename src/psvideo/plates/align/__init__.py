@@ -13,6 +13,7 @@ Rooms, from the bottom up:
 
 - ``velocity``: where things move, found from all lights together
 - ``doubt``: by how much a plate may be off because the two that it comes from do not match
+- ``lent``: rows of other flashes brought to the instant of the plate that lacks them, below 360 degrees
 - ``rigid``: how bodies move that turn, along ways that are curved
 - ``shake``: where the picture is as a whole at every flash, where the camera shakes
 

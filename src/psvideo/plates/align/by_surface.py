@@ -248,7 +248,7 @@ class BySurface:
         for codes, span_s, counts in zip(lights.codes[place], (since_s, -until_s), (1 - late, late), strict=True):
             moved_rows(codes, span_s, velocity, stride, 0, len(out), out)
             total += counts[::stride, None] * light_of(out)
-        return total * self.lamps.evening(light, total.shape)
+        return np.asarray(total * self.lamps.evening(light, total.shape), np.float32)
 
 
 def _clearly(best: SurfaceLeft, before: SurfaceLeft) -> Flags:

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.arrays import Flags, Floats, Image
@@ -66,7 +67,7 @@ def _wider(motion: Followed, ways_px: Floats) -> Flags:
     return cv2.dilate(motion.moves.astype(np.uint8), np.ones((high, wide), np.uint8)) > 0
 
 
-def _columns(moving: Flags, rows: np.ndarray, shape: tuple[int, ...]) -> range:
+def _columns(moving: Flags, rows: NDArray[np.intp], shape: tuple[int, ...]) -> range:
     """Return the columns of a plate between which anything moves or may be hidden in some rows."""
     high, wide = shape[0] / moving.shape[0], shape[1] / moving.shape[1]
     some = moving[max(int(rows[0] / high) - 1, 0) : int(rows[-1] / high) + 2].any(axis=0)
@@ -83,7 +84,7 @@ class _Piece:
 
     plate: LightPlate
     motion: Followed
-    rows: np.ndarray
+    rows: NDArray[np.intp]
     cols: range
     x: Floats
     y: Floats
@@ -91,7 +92,7 @@ class _Piece:
     moves: Flags
 
     @classmethod
-    def of(cls, plate: LightPlate, motion: Followed, rows: np.ndarray, cols: range) -> "_Piece":
+    def of(cls, plate: LightPlate, motion: Followed, rows: NDArray[np.intp], cols: range) -> "_Piece":
         x, y = np.meshgrid(np.arange(cols.start, cols.stop, dtype=np.float32), rows.astype(np.float32))
         velocity = _velocity(motion, plate, x, y)
         span_s = np.float32(plate.time_s - motion.time_s)

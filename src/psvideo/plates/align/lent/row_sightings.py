@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.model.arrays import Flags, Floats
 from psvideo.plates.align.by_surface import BySurface
@@ -50,11 +51,13 @@ def row_pair(shots: Sequence[Sketch], time_s: float) -> RowPair | None:
     return RowPair(pair=Pair(before=before, after=evened(before, after)), spans_s=spans_s.astype(np.float32))
 
 
-def _chosen(seen: np.ndarray, places: np.ndarray, which: np.ndarray) -> np.ndarray:
-    return np.argmax(seen & (places == which), axis=0)
+def _chosen(seen: Flags, places: NDArray[np.intp], which: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return of every row the shot that was the first, second ... to show it, (row,)."""
+    return np.asarray(np.argmax(seen & (places == which), axis=0), np.intp)
 
 
-def _made_up(shots: Sequence[Sketch], which: np.ndarray, known: np.ndarray) -> Sketch:
+def _made_up(shots: Sequence[Sketch], which: NDArray[np.intp], known: Flags) -> Sketch:
+    """Return the sketch whose rows are each of one of the shots; ``known`` are those that count."""
     codes = np.empty_like(shots[0].codes)
     for place in np.unique(which):
         codes[which == place] = shots[place].codes[which == place]

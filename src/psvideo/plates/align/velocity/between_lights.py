@@ -43,7 +43,8 @@ LONE_PX = 5
 class BetweenLights:
     """The detail of every light's plate that is nearest to the instant, (light, row, col), in the order of time, the
     seconds from each of them to the instant, (light,), below 0 where it is later, and how many velocities there are,
-    (row, col)."""
+    (row, col). Where the rows of a plate show several instants, ``rows_s`` (light, row) are the seconds from each of
+    the velocities' rows, and the lights are in the order in which they come."""
 
     details: Codes8
     since_s: Floats
@@ -104,8 +105,8 @@ class BetweenLights:
         step_s = since_s - float(self.since_s[place + 1])
         flow = flow_from(self.details[place], self.details[place + 1], coarser=COARSER)
         out = np.empty((2, *self.shape), np.float32)
-        each = (np.full(self.shape[0], value, np.float32) for value in (since_s / step_s, 1 / step_s))
-        arriving_rows(flow, *each, 0, self.shape[0], out)
+        shares, per_s = (np.full(self.shape[0], value, np.float32) for value in (since_s / step_s, 1 / step_s))
+        arriving_rows(flow, shares, per_s, 0, self.shape[0], out)
         return out
 
     def disagree(self, velocity: Floats, window_px: int) -> Floats:

@@ -94,9 +94,9 @@ def unlike_rows(
 def moved_rows(
     picture: Codes8, since_s: Floats, velocity: Floats, stride: int, first: int, last: int, out: Floats
 ) -> None:
-    """Fill rows of ``out`` (row, col) with what a picture of so many seconds ago (row,), below 0 of so many ahead, shows
-    along velocities, (2, row, col) in their own pixels per second; ``out`` takes every ``stride``-th of them. The
-    picture has as many pixels as there are velocities or more."""
+    """Fill rows of ``out`` (row, col) with what a picture of so many seconds ago, below 0 of so many ahead, shows along
+    velocities, (2, row, col) in their own pixels per second; ``since_s`` (row,) is of each row of these, of which
+    ``out`` takes every ``stride``-th. The picture has as many pixels as there are velocities or more."""
     given, way, made, ago = lent(picture), lent(velocity), lent(out), lent(since_s)
     high, wide = _steps(given.shape, way.shape[1:])
     for row in range(first, last):

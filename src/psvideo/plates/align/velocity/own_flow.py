@@ -54,8 +54,8 @@ class OwnFlow:
         ways = []
         for flow, share, sign in ((self.there, since_s / round_s, 1.0), (self.back, until_s / round_s, -1.0)):
             way = np.empty((2, *self.behind.shape), np.float32)
-            each = (np.full(way.shape[1], value, np.float32) for value in (share, sign / round_s))
-            arriving_rows(flow, *each, 0, way.shape[1], way)
+            shares, per_s = (np.full(way.shape[1], value, np.float32) for value in (share, sign / round_s))
+            arriving_rows(flow, shares, per_s, 0, way.shape[1], way)
             ways.append(way)
         return ways
 
