@@ -37,7 +37,7 @@ def row_pair(shots: Sequence[Sketch], time_s: float) -> RowPair | None:
     shots = sorted(shots, key=lambda shot: shot.time_s)
     times_s = np.array([shot.time_s for shot in shots])
     seen = np.stack([shot.seen.reshape(len(shot.codes), -1).all(axis=1) for shot in shots])
-    places = np.cumsum(seen, axis=0)
+    places = np.cumsum(seen, axis=0, dtype=np.intp)
     count = places[-1]
     until = (seen & (times_s <= time_s)[:, None]).sum(axis=0)
     first = np.clip(until, 1, np.maximum(count - 1, 1))  # of a row's flashes, the last one up to the instant
