@@ -15,10 +15,8 @@ from psvideo.model.rows.ripple import Exposures, Ripple
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient import ambient_followed, ambient_off
 from psvideo.plates.ambient.ambient_blocks import block_px, no_blocks, over_bands
-from psvideo.plates.ambient.ambient_followed import agreed_ripple
 from psvideo.plates.ambient.ambient_kernel import AveragedDarks, OneMore, average_rows, measure_rows
 from psvideo.plates.ambient.ambient_level import AmbientLevel
-from psvideo.plates.ambient.ambient_shown import FIRST_DARKS
 from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate, split
@@ -45,14 +43,10 @@ class Take:
     plates: list[Plate]
     truth: dict[int, np.ndarray]
     ripple: Ripple | None = None
-    early: Ripple | None = None
-
-    @property
-    def darks(self) -> list[Plate]:
-        return [plate for plate in self.plates if not plate.flash.lights]
 
     def without_ambient(self) -> Iterator[Plate]:
-        return ambient_off.subtract(self.plates, darks=self.darks, ripple=self.ripple, early=self.early)
+        darks = [plate for plate in self.plates if not plate.flash.lights]
+        return ambient_off.subtract(self.plates, darks=darks, ripple=self.ripple)
 
     def errors(self) -> np.ndarray:
         """Return the errors of whole plates between two dark slots once ambient light is off, (plate, row, col)."""
@@ -181,25 +175,6 @@ def test_mains_light_that_the_timing_knows_is_off_from_the_first_plate_on(make_p
     take = shoot(plan, held, mains=MainsSwing(hz=100.2, depth=1.0))
     assert rms(take.errors()[:3]) > 2e-3
     assert rms(replace(take, ripple=_true_ripple(plan, 100.2, 1.0)).errors()) < 1e-5
-
-
-@pytest.mark.parametrize("hz", [100.0, 100.2])
-def test_mains_light_that_the_first_dark_slots_agree_on_is_off_from_the_first_plate_on(
-    hz: float, make_plan: PlanMaker
-) -> None:
-    """The first results of a clip held the ripple, and a standing wall seemed to move when it went."""
-    plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
-    take = shoot(plan, held, mains=MainsSwing(hz=hz, depth=1.0))
-    found = agreed_ripple(take.darks[:FIRST_DARKS])
-    assert found is not None
-    assert rms(replace(take, early=found).errors()[:3]) < rms(take.errors()[:3]) / 4
-    late = [rms(one.errors()[8:]) for one in (take, replace(take, early=found))]
-    assert late[0] == pytest.approx(late[1], abs=1e-6), "later pairs know the phase better"
-
-
-def test_dark_slots_without_mains_light_agree_on_nothing(make_plan: PlanMaker) -> None:
-    plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
-    assert agreed_ripple(shoot(plan, dimmed, noise=NOISE).darks[:FIRST_DARKS]) is None
 
 
 def test_a_rough_ripple_of_the_clip_gives_way_to_what_dark_slots_agree_on(make_plan: PlanMaker) -> None:

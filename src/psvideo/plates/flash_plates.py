@@ -24,7 +24,6 @@ from psvideo.plates.ambient.ambient_shown import (
     ambient_shown,
     at_true_places,
     dark_plates,
-    early_ripple,
     evenly_exposed,
     ripple_of,
 )
@@ -81,9 +80,8 @@ def clip_plates(
         darks: Iterator[Plate] = chain(islice(dark_plates(take, timing), len(early)), later)
     else:
         darks = ambient_shown(take, timing, each_window, after=-1 if known is None else known.index)
-    ripple, first = ripple_of(take, timing), early_ripple(take, timing) if known is None else None
-    free = subtract(single, darks=darks, waits=not come_often, known=known, ripple=ripple, early=first)
-    return map(_colour_of(clip), free)
+    ripple = ripple_of(take, timing)
+    return map(_colour_of(clip), subtract(single, darks=darks, waits=not come_often, known=known, ripple=ripple))
 
 
 def first_ambient(take: Take, timing: Timing) -> LightPlate | None:

@@ -7,7 +7,6 @@ noise. Where the picture still differs by more than noise (someone moved, a shad
 light, which swings from exposure to exposure, is separated row by row (``mains``) and put back for each plate.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,15 +45,11 @@ class Ambient:
     steady: bool = False
 
 
-def update(
-    ambient: Ambient | None, dark: Plate, *, ripple: Ripple | None = None, early: Ripple | None = None
-) -> Ambient:
-    """Return the ambient light with one more dark slot in it; ``ripple`` is what the timing found of the mains, and
-    ``early`` what the clip's first slots agree on."""
+def update(ambient: Ambient | None, dark: Plate, *, ripple: Ripple | None = None) -> Ambient:
+    """Return the ambient light with one more dark slot in it; ``ripple`` is what the timing found of the mains."""
     rows, coarse = _looked_at(dark)
     if ambient is None:
-        mains = Mains(rows=rows, timed=ripple, early=early)
-        factor = _freeing(mains.ripple, rows)
+        factor = _freeing(ripple, rows)
         slots = np.broadcast_to(dark.seen[:, None], (len(dark.seen), coarse.shape[1])).astype(np.float32)
         return Ambient(
             level=AmbientLevel.of(times_rows(dark.image, factor)),
@@ -62,7 +57,7 @@ def update(
             slots=slots,
             middle_s=rows.opened.middle_s,
             known=dark.seen,
-            mains=mains,
+            mains=Mains(rows=rows, timed=ripple),
             index=dark.flash.index,
         )
     mains = ambient.mains.next(rows)
@@ -84,17 +79,6 @@ def update(
         index=dark.flash.index,
         steady=bool(whole.all()) and change.is_steady(coarse),
     )
-
-
-def agreed_ripple(darks: Iterable[Plate]) -> Ripple | None:
-    """Return the first ripple that two pairs of dark slots in a row agree on, None where none do."""
-    mains: Mains | None = None
-    for dark in darks:
-        rows, _ = _looked_at(dark)
-        mains = Mains(rows=rows) if mains is None else mains.next(rows)
-        if mains.agreed is not None:
-            return mains.agreed
-    return None
 
 
 def _freeing(ripple: Ripple | None, rows: RowLight) -> Doubles:

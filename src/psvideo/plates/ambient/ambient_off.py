@@ -64,7 +64,6 @@ def subtract(
     waits: bool = True,
     known: Ambient | None = None,
     ripple: Ripple | None = None,
-    early: Ripple | None = None,
 ) -> Iterator[Plate]:
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average at their moment.
 
@@ -72,7 +71,7 @@ def subtract(
     ``waits`` False: not even that while the light is steady, so that few frames are held; then the next dark slot is
     read when it passes. Before the first and after the last, its light is taken as it is. Without any, plates keep
     theirs. ``known`` is what dark slots showed before the first plate, where ``darks`` begin after these;
-    ``ripple`` is what the clip's timing found of the mains, ``early`` what its first dark slots agree on.
+    ``ripple`` is what the clip's timing found of the mains.
     """
     coming = iter(darks)
     before = after = known
@@ -83,7 +82,7 @@ def subtract(
                 before = after
                 break
             before = None
-            later = update(after, dark, ripple=ripple, early=early)
+            later = update(after, dark, ripple=ripple)
             alone = after is None or later.steady or first_ripple(after.mains, later.mains)
             before = later if alone else after
             after = later

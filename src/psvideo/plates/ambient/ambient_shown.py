@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
@@ -12,14 +11,12 @@ from psvideo.model.camera import Camera
 from psvideo.model.rows.recipe import frames_of
 from psvideo.model.rows.ripple import Ripple
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
-from psvideo.plates.ambient.ambient_followed import Ambient, agreed_ripple, update
+from psvideo.plates.ambient.ambient_followed import Ambient, update
 from psvideo.plates.ambient.ambient_regression import Design, Separated, design_of, separated, windows_of
 from psvideo.plates.mixing.mixture import mixture_of
 from psvideo.plates.split import Plate, plate_of
 from psvideo.plates.used_flashes import used_of
 
-FIRST_DARKS = 4
-"""A ripple that so many dark slots at the clip's start agree on is known from its first plate on."""
 AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory. Files that hold plain codes are read
 so quickly that one is enough."""
@@ -125,11 +122,10 @@ def _as_dark_slot(found: Separated, design: Design, camera: Camera, last: int) -
 def ambient_before(take: Take, timing: Timing, index: int) -> Ambient | None:
     """Return what the dark slots before a flash show of the ambient light, None where there is none; decodes them."""
     ambient: Ambient | None = None
-    ripple, early = ripple_of(take, timing), early_ripple(take, timing)
     for dark in ambient_shown(take, timing, None):
         if dark.flash.index >= index:
             break
-        ambient = update(ambient, dark, ripple=ripple, early=early)
+        ambient = update(ambient, dark, ripple=ripple_of(take, timing))
     return ambient
 
 
@@ -147,14 +143,6 @@ def ambient_near(take: Take, timing: Timing, index: int) -> Ambient | None:
 def ripple_of(take: Take, timing: Timing) -> Ripple | None:
     """Return the ripple that dark slots hold; what windows of frames show in their place is a mean over it."""
     return None if all(flash.lit for flash in take.plan.flashes) else timing.mains
-
-
-def early_ripple(take: Take, timing: Timing) -> Ripple | None:
-    """Return the ripple that a clip's first dark slots agree on, for plates that come before they do; None where they
-    do not agree, or the timing knows it. Decodes their frames."""
-    if timing.mains is not None or take.plan.mode == "synced" or all(flash.lit for flash in take.plan.flashes):
-        return None
-    return agreed_ripple(islice(dark_plates(take, timing), FIRST_DARKS))
 
 
 def at_true_places(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:

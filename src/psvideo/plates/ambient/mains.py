@@ -55,8 +55,7 @@ class Mains:
     """What dark slots showed of mains light up to the one whose ``rows`` these are.
 
     ``last`` is what the last pair of slots showed, ``agreed`` what two pairs agreed on, ``unseen`` slots ago;
-    ``timed`` is what the whole clip showed when it was timed, and ``early`` what the clip's first slots agree on, until
-    two pairs do.
+    ``timed`` is what the whole clip showed when it was timed.
     """
 
     rows: RowLight
@@ -64,20 +63,19 @@ class Mains:
     agreed: Ripple | None = None
     unseen: int = 0
     timed: Ripple | None = None
-    early: Ripple | None = None
 
     @property
     def ripple(self) -> Ripple | None:
         """What is known best: the whole clip's, unless that is rough and two pairs of slots agreed."""
         if self.timed is None or (self.agreed is not None and self.timed.error > ROUGH * abs(self.timed.amplitude)):
-            return self.agreed or self.early
+            return self.agreed
         return self.timed
 
     def next(self, rows: RowLight) -> "Mains":
         """Return what is known with one more dark slot."""
         found = find_ripple(self.rows, rows)
         if found is not None and self.last is not None and _agree(found, self.last):
-            return replace(self, rows=rows, last=found, agreed=found, unseen=0, early=None)
+            return replace(self, rows=rows, last=found, agreed=found, unseen=0)
         if self.agreed is None or self.unseen == LONGEST_UNSEEN:
             return replace(self, rows=rows, last=found, agreed=None, unseen=0)
         return replace(self, rows=rows, last=found, unseen=self.unseen + 1)

@@ -35,7 +35,8 @@ LEAST_STEP, MOST_STEP = 0.2, 2.0
 DEPARTS_DEG = 2.5
 """At an edge of paint that is asked only of what departs from the mean around by more: looking takes long."""
 OF_AROUND = 0.8
-"""So much of the errors around is common to them, and stays."""
+"""So much of the errors around is common to them, and stays, where motion makes them; where things stand all of it is:
+it comes of the rig or the surface."""
 GAIN, AGREES = 0.8, 1.5
 """What continues must be surer than this times the pixel's own error, and may contradict it by so many times what that
 may well be."""
@@ -58,7 +59,10 @@ def continued(surface: Surface, moves: Mask, *, limit_deg: float) -> Surface:
     shape = error.shape
     stride = max(round(shape[1] / moves.shape[1] / FINEST), 1)
     return _continued(
-        surface, error, at_points(moves, shape), _Asked(limit_deg=limit_deg, stride=stride, at_paint=True)
+        surface,
+        error,
+        at_points(moves, shape),
+        _Asked(limit_deg=limit_deg, stride=stride, of_around=OF_AROUND, at_paint=True),
     )
 
 
@@ -70,16 +74,17 @@ def continued_at_rest(surface: Surface, moves: Mask | None, *, limit_deg: float)
         return surface
     shape = error.shape
     rests = np.ones(shape, np.bool_) if moves is None else ~at_points(moves, shape)
-    return _continued(surface, error, rests, _Asked(limit_deg=limit_deg, stride=1, at_paint=False))
+    return _continued(surface, error, rests, _Asked(limit_deg=limit_deg, stride=1, of_around=1.0, at_paint=False))
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """What is asked: normals with errors up to ``limit_deg``, by every ``stride``-th pixel around, and those at edges
-    of paint as well if ``at_paint``."""
+    """What is asked: normals with errors up to ``limit_deg``, by every ``stride``-th pixel around, of whose errors the
+    share ``of_around`` is common to them, and those at edges of paint as well if ``at_paint``."""
 
     limit_deg: float
     stride: int
+    of_around: float
     at_paint: bool
 
 
@@ -88,7 +93,7 @@ def _continued(surface: Surface, error: NDArray[np.floating], there: Mask, asked
     if not sure.any():
         return surface
     found = [
-        part.taken(asked.limit_deg)
+        part.taken(asked)
         for first in range(0, len(error), BAND_ROWS)
         if (part := _Part.around(solved, (surface, error), sure, asked, first)) is not None
     ]
@@ -150,13 +155,13 @@ class _Part:
             stride=stride,
         )
 
-    def taken(self, limit_deg: float) -> tuple[tuple[Indices, Indices], Doubles, Doubles]:
+    def taken(self, asked: _Asked) -> tuple[tuple[Indices, Indices], Doubles, Doubles]:
         """Return rows and columns of the points that continue, with their normals and errors in degrees."""
-        normals, error_deg, takes = self.looked_at(limit_deg)
+        normals, error_deg, takes = self.looked_at(asked)
         rows, cols = (self.places[takes] + np.array(self.corner, np.uint32)).T
         return (rows, cols), normals[takes], error_deg[takes]
 
-    def looked_at(self, limit_deg: float) -> tuple[Doubles, Doubles, Mask]:
+    def looked_at(self, asked: _Asked) -> tuple[Doubles, Doubles, Mask]:
         """Return the points' normals (point, 3) and errors in degrees with what continues from around, and which of
         them are sure enough."""
         found = self._found()
@@ -167,8 +172,8 @@ class _Part:
         apart = np.degrees(np.arccos(np.clip((own * onward).sum(axis=1), -1, 1)))
         own_deg, most_deg = (np.hypot(claimed_deg, each * steps) for each in (PAINT_DEG, FARTHEST_DEG))
         unexplained = OF_APART * apart * np.square(claimed_deg / own_deg)
-        error_deg = np.hypot(OF_AROUND * found[:, 3], unexplained)
-        takes = (share > FEWEST) & (uncertain < MOST_UNCERTAIN) & (error_deg <= limit_deg)
+        error_deg = np.hypot(asked.of_around * found[:, 3], unexplained)
+        takes = (share > FEWEST) & (uncertain < MOST_UNCERTAIN) & (error_deg <= asked.limit_deg)
         takes &= (error_deg < GAIN * own_deg) & (apart < AGREES * most_deg)
         counts = [1 / np.square(np.maximum(each, LEAST_DEG))[:, None] for each in (own_deg, error_deg)]
         mean = counts[0] * own + counts[1] * onward
