@@ -87,7 +87,7 @@ def _said_over_true(shape: str, ways: np.ndarray, wrong_deg: float, gloss: float
     return MEAN_OF_HELD * found.likely_deg / true_deg, MEAN_OF_HELD * found.misfit.error_deg / true_deg
 
 
-def test_most_takes_under_five_lights_are_off_by_what_is_likely_and_few_by_what_was_predicted() -> None:
+def test_most_takes_under_five_lights_are_off_by_what_is_likely_and_by_what_is_predicted_of_their_normals() -> None:
     """Of right rigs and of wrong ones, of what shines and what does not."""
     takes = product(("ball", "waves", "bottle"), (30, 42), ((2, 0.0), (5, 0.0), (0, 0.12)))
     ratios = [
@@ -96,4 +96,4 @@ def test_most_takes_under_five_lights_are_off_by_what_is_likely_and_few_by_what_
     ]
     likely, predicted = (np.abs(np.log(ratios)) < np.log(FACTOR)).mean(axis=0)
     assert likely > 0.55
-    assert predicted < likely - 0.2
+    assert predicted > 0.55

@@ -26,7 +26,7 @@ DARK = 2.0
 LIT, LIT_SHARE, LIT_PIXELS = 6.0, 0.02, 64
 """A small subject before black is what is brighter than this many such deviations (by chance no dark place is) and than
 this share of the brightest place. Every level of it is seen at this many places at least."""
-LEAST_SPREAD, MOST_SPREAD = 1.3, 100.0
+LEAST_SPREAD, MOST_SPREAD = 1.3, 1e4
 """Chance, and the edges of what is lit, make differences from farther away larger by up to the first. No demosaic and
 no filter spreads noise by the second: a codec left nothing between neighbours, and steps between its blocks. (H.264 at
 a rate factor of 26: noise of 43 times saturation was found in one round, and all of it lost.)"""
