@@ -7,7 +7,8 @@ import pytest
 
 from psvideo.model.arrays import Mask
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.trust.continued import BAND_ROWS, continued, continued_at_rest
+from psvideo.solve.normals.trust.continued import continued, continued_at_rest
+from psvideo.solve.normals.trust.continued_part import BAND_ROWS
 
 SHAPE = 24, 40
 STRIP = slice(19, 21)

@@ -10,7 +10,7 @@ and of light that all lamps add ``added_light``; both look at ``slope_pairs``, w
 or pales where something shines (``by_colour``), shadows that pass for light (``lit_shadows``), ``near_spread`` (near
 lights, whose directions depend on the distance), ``moving_doubt`` (plates that do not match after alignment, beside
 what more than three lights say of them, ``witness``; ``agreeing`` takes off what these do not bear
-out; ``continued``, with ``continued_kernel``, takes normals on across narrow doubt),
+out; ``continued``, with ``continued_part`` and ``continued_kernel``, takes normals on across narrow doubt),
 ``few_checked`` (what is left over may come of, under four to eight lights: a model of the subject, where it leaves
 no more than ``by_other_rig``, or such a rig; by how much that turns normals, ``rig_spread``), and ``unchecked`` (what
 three lights leave of real surfaces, and show hardly anywhere; and how well few lights check each other;

@@ -2,7 +2,8 @@
 
 Of the changes of k lights' vectors, 3 k numbers, a subject shows 3 (k - 3): the others turn normals and leave nothing
 over. So what shows only says how far lights typically are off, and the rest may be off as much: changes are Gaussian,
-of directions and of strengths, of sizes that what shows makes likely (a mixture over ``SIZES``, by their evidence).
+of directions and of strengths, of sizes that what shows makes likely (a mixture over ``OFF`` and ``STRENGTHS``, by
+their evidence).
 """
 
 import numpy as np
