@@ -46,21 +46,17 @@ def continued_at_rest(surface: Surface, moves: Mask | None, *, limit_deg: float)
     error = surface.error_deg
     if error is None:
         return surface
-    shape = error.shape
-    rests = np.ones(shape, np.bool_) if moves is None else ~at_points(moves, shape)
+    rests = None if moves is None else ~at_points(moves, error.shape)
     return _continued(surface, error, rests, AskedPixels(limit_deg=limit_deg, stride=1, of_around=1.0, at_paint=False))
 
 
-def _continued(surface: Surface, error: NDArray[np.floating], there: Mask, asked: AskedPixels) -> Surface:
-    solved, sure = there & (error > 0), surface.valid & there
-    if not sure.any():
-        return surface
+def _continued(surface: Surface, error: NDArray[np.floating], there: Mask | None, asked: AskedPixels) -> Surface:
     found = [
         part.taken(asked)
         for first in range(0, len(error), BAND_ROWS)
-        if (part := ContinuedPart.around(solved, (surface, error), sure, asked, first)) is not None
+        if (part := ContinuedPart.around((surface, error), there, asked, first)) is not None
     ]
-    valid = surface.valid.copy()
+    valid = surface.valid.copy() if found else surface.valid
     for (rows, cols), normals, errors_deg in found:  # after all were looked at: what is told is what was solved
         surface.normals[rows, cols] = normals.astype(surface.normals.dtype)
         error[rows, cols] = errors_deg.astype(error.dtype)

@@ -65,36 +65,40 @@ class ContinuedPart:
 
     @classmethod
     def around(
-        cls, solved: Mask, given: tuple[Surface, NDArray[np.floating]], sure: Mask, asked: AskedPixels, first: int
+        cls, given: tuple[Surface, NDArray[np.floating]], there: Mask | None, asked: AskedPixels, first: int
     ) -> "ContinuedPart | None":
-        """Return what lies around what is asked in rows from ``first`` on of a surface, which is ``given`` with its
-        errors, and is ``solved`` (row, col): what is not ``sure`` of that, and what lies at an edge of paint; None
-        where nothing is."""
+        """Return what lies around what is asked in rows from ``first`` on of a surface, ``given`` with its errors, of
+        what is ``there`` (row, col; all where None): what was solved and is not sure, and what lies at an edge of
+        paint; None where nothing is."""
         (surface, error), stride = given, asked.stride
-        reach, band = REACH_PX * stride, slice(first, first + BAND_ROWS)
-        open_ = solved[band] if asked.at_paint else solved[band] & ~sure[band] & _beside(sure, first)
-        if not open_.any():
+        reach = REACH_PX * stride
+        rows = slice(max(first - reach, 0), min(first + BAND_ROWS + reach, len(error)))
+        solved, sure = error[rows] > 0, surface.valid[rows].copy()
+        if there is not None:
+            solved &= there[rows]
+            sure &= there[rows]
+        looked = solved if asked.at_paint else solved & ~sure & _beside(sure)
+        looked[: first - rows.start] = False  # other bands' rows
+        looked[first + BAND_ROWS - rows.start :] = False
+        if not looked.any() or not sure.any():
             return None
-        rows, cols = (np.flatnonzero(open_.any(axis=axis)) for axis in (1, 0))
-        top, left = max(first + int(rows[0]) - reach, 0), max(int(cols[0]) - reach, 0)
-        part = slice(top, first + int(rows[-1]) + reach + 1), slice(left, int(cols[-1]) + reach + 1)
-        level = _level(surface.albedo[part])
-        normals = np.ascontiguousarray(np.moveaxis(surface.normals[part], -1, 0), np.float32)
-        step, doubted = np.zeros_like(level), np.zeros(level.shape, np.bool_)
-        own = slice(first - top if top < first else 0, first + BAND_ROWS - top)
-        doubted[own] = open_[max(top - first, 0) :, left : left + level.shape[1]][: doubted[own].shape[0]]
+        spans = [np.flatnonzero(looked.any(axis=axis)) for axis in (1, 0)]
+        part = tuple(slice(max(int(span[0]) - reach, 0), int(span[-1]) + reach + 1) for span in spans)
+        places, sure = looked[part], np.ascontiguousarray(sure[part])
+        level = _level(surface.albedo[rows][part])
+        normals = np.ascontiguousarray(np.moveaxis(surface.normals[rows][part], -1, 0), np.float32)
+        step = np.zeros_like(level)
         if asked.at_paint:
-            step = _paint_step(level, error[part] > 0, stride)
-            at_edge = (step > 0) & _departs(normals, sure[part], 2 * reach + 1)
-            doubted &= ~sure[part] | at_edge
+            step = _paint_step(level, error[rows][part] > 0, stride)
+            places &= ~sure | ((step > 0) & _departs(normals, sure, 2 * reach + 1))
         return cls(
-            places=np.argwhere(doubted).astype(np.uint32),
-            corner=(top, left),
+            places=np.argwhere(places).astype(np.uint32),
+            corner=(rows.start + part[0].start, part[1].start),
             normals=normals,
             level=level,
             step=step,
-            error=np.ascontiguousarray(error[part], np.float32),
-            sure=np.ascontiguousarray(sure[part]),
+            error=np.ascontiguousarray(error[rows][part], np.float32),
+            sure=sure,
             stride=stride,
         )
 
@@ -156,12 +160,10 @@ def _level(albedo: NDArray[np.floating]) -> Floats:
     return level
 
 
-def _beside(sure: Mask, first: int) -> Mask:
-    """Return where something within two pixels is sure, in a band of rows: farther off too little of a window is."""
-    top = max(first - TWO_PX, 0)
-    some = np.ascontiguousarray(sure[top : first + BAND_ROWS + TWO_PX]).view(np.uint8)
-    near = cv2.dilate(some, np.ones((2 * TWO_PX + 1,) * 2, np.uint8))
-    return np.asarray(near[first - top :][:BAND_ROWS]).astype(np.bool_)
+def _beside(sure: Mask) -> Mask:
+    """Return where something within two pixels is sure: farther off too little of a window is."""
+    near = cv2.dilate(np.ascontiguousarray(sure).view(np.uint8), np.ones((2 * TWO_PX + 1,) * 2, np.uint8))
+    return np.asarray(near).astype(np.bool_)
 
 
 def _paint_step(level: Floats, known: Mask, stride: int) -> Floats:
