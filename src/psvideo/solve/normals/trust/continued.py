@@ -56,7 +56,9 @@ def _continued(surface: Surface, error: NDArray[np.floating], there: Mask | None
         for first in range(0, len(error), BAND_ROWS)
         if (part := ContinuedPart.around((surface, error), there, asked, first)) is not None
     ]
-    valid = surface.valid.copy() if found else surface.valid
+    if not found:
+        return surface
+    valid = surface.valid.copy()
     for (rows, cols), normals, errors_deg in found:  # after all were looked at: what is told is what was solved
         surface.normals[rows, cols] = normals.astype(surface.normals.dtype)
         error[rows, cols] = errors_deg.astype(error.dtype)

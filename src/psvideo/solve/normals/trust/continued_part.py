@@ -102,11 +102,11 @@ class ContinuedPart:
             stride=stride,
         )
 
-    def taken(self, asked: AskedPixels) -> tuple[tuple[Indices, Indices], Doubles, Doubles]:
+    def taken(self, asked: AskedPixels) -> tuple[tuple[Indices, Indices], Floats, Floats]:
         """Return rows and columns of the points that continue, with their normals and errors in degrees."""
         normals, error_deg, takes = self.looked_at(asked)
         rows, cols = (self.places[takes] + np.array(self.corner, np.uint32)).T
-        return (rows, cols), normals[takes], error_deg[takes]
+        return (rows, cols), normals[takes].astype(np.float32), error_deg[takes].astype(np.float32)
 
     def looked_at(self, asked: AskedPixels) -> tuple[Doubles, Doubles, Mask]:
         """Return the points' normals (point, 3) and errors in degrees with what continues from around, and which of
