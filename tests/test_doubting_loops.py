@@ -172,7 +172,8 @@ def alone_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
         misfit -= signs.uneven * np.maximum(misfit - misfit_deg, 0)
         by_cause = how.by_cause * np.asarray(signs.by_cause_deg)
         known = np.sqrt((1 - signs.explained) * misfit**2 + signs.explained * by_cause**2)
-        misfit = known if signs.by_rig else np.minimum(known, misfit)
+        most = 1e4 if not signs.plain else how.by_rig_of_four
+        misfit = np.minimum(known, (most if signs.by_rig else 1.0) * misfit)
         both = np.hypot(np.hypot(misfit, how.indirect * signs.indirect_deg), signs.unchecked_deg)
         most_torn = how.torn_beside * both + how.torn_alone_deg + signs.unchecked_deg
         torn_deg = (1 - signs.explained) * torn_deg

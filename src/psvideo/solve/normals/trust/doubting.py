@@ -15,6 +15,7 @@ from psvideo.solve.normals.trust.signs import Signs
 if TYPE_CHECKING:
     from psvideo.solve.normals.trust.doubting_kernel import Factors
 
+EVERYTHING = 1e9
 LEAST_DEG = 0.3
 """Where normals are doubted by less, nothing needs albedo to say so."""
 
@@ -38,6 +39,7 @@ class Doubting:
         nothing else speaks, and they count without that limit (``unchecked.py``).
     by_model: the whole error is at least this share of the angle by which the subject's model would turn the normal.
     by_cause: where it is known of what a misfit comes, so much of the angle by which that turns normals counts instead.
+    by_rig_of_four: under four lights, which show three numbers of the rig's twelve, up to so many times a misfit.
     length, length_beside, length_from_deg: how much it counts where albedo and residuals stand out together, and up to
         how many times of what all the rest is beyond some degrees: where nothing else speaks against a surface, edges
         of paint and shadows are as good as it is.
@@ -64,6 +66,7 @@ class Doubting:
     torn_alone_deg: float = 0.1
     by_model: float = 0.75
     by_cause: float = 1.3
+    by_rig_of_four: float = 1.3
     length: float = 2.0
     length_beside: float = 4.0
     length_from_deg: float = 2.0
@@ -92,7 +95,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     planes[kernel.AT_LEAST] = np.float32(how.by_model) * signs.by_model_deg
     by_albedo_deg = np.hypot(np.hypot(signs.by_slope_deg, signs.by_colour_deg), signs.shadows_deg)
     planes[kernel.BESIDE_MISFIT] = by_albedo_deg
-    factors = kernel.Factors(*np.array((*counts, signs.explained, signs.by_rig), np.float32))
+    factors = kernel.Factors(*np.array((*counts, signs.explained, _most(signs, how)), np.float32))
     doubt = _of_planes(planes, factors, signs, how)
     if not signs.unsaid:
         return doubt
@@ -100,6 +103,14 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     alone = _of_planes(planes, factors, signs, how)
     either = np.maximum(_beside_albedo(signs, alone, how) * alone, by_albedo_deg)
     return np.asarray(doubt + signs.in_light * (either - doubt), np.float32)
+
+
+def _most(signs: Signs, how: Doubting) -> float:
+    """Return how many times the square of a misfit what explains it may be: a model no more than that; a rig turns
+    normals by what residuals need not show."""
+    if not signs.by_rig:
+        return 1.0
+    return how.by_rig_of_four**2 if signs.plain else EVERYTHING
 
 
 def _of_planes(planes: Floats, factors: "Factors", signs: Signs, how: Doubting) -> Floats:

@@ -24,8 +24,8 @@ SIGNS = 13
 class Factors(NamedTuple):
     """How much the signs of ``fill_doubt`` count, float32: a misfit m as ``misfit`` times m^(1 + ``power``) over
     m + ``little_deg``, as far as it is not ``explained``; light from ``around``; and ``torn`` normals, up to the share
-    ``torn_beside`` of the other doubt and ``torn_alone_deg``. What explains it counts by no more than a misfit does,
-    unless it is the rig, ``by_rig``: of that residuals need not show much."""
+    ``torn_beside`` of the other doubt and ``torn_alone_deg``. What explains it counts up to ``most`` times the square
+    of what a misfit does."""
 
     misfit: np.float32
     power: np.float32
@@ -35,7 +35,7 @@ class Factors(NamedTuple):
     torn_beside: np.float32
     torn_alone_deg: np.float32
     explained: np.float32
-    by_rig: np.float32
+    most: np.float32
 
 
 @FUSED.kept
@@ -73,7 +73,7 @@ def _turned(
     misfit = factors.misfit * shows / (misfit_deg + factors.little_deg) if misfit_deg > ZERO else ZERO
     misfit -= uneven * max(misfit - misfit_deg, ZERO)
     unknown = (ONE - factors.explained) * misfit * misfit
-    turned = unknown + by_cause if factors.by_rig else min(unknown + by_cause, misfit * misfit)
+    turned = min(unknown + by_cause, factors.most * misfit * misfit)
     return np.float32(np.sqrt(turned + hidden_deg * hidden_deg))
 
 
