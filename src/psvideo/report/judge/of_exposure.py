@@ -30,10 +30,11 @@ MISPLACED = 16.0
 """A mask lies beside the subject where the picture is this many times brighter outside of it than within: a dark
 subject before a white wall differs by a photograph's contrast, some 8 times."""
 MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.25
-"""Shares of the subject. More than the first, clipped by one lamp, costs accuracy there, and where that leaves fewer
-than three lamps, the normal; of more than the second it may not. (A bust under five lamps that clip 6 to 32 % of it
-each: 5 % are left with fewer than three, and trusted normals are 0.9 degrees off. Under four lamps, one of which clips
-69 %: 14 % and 0.4 degrees. Under four that clip 30 to 63 % each: 83 %, and 92 % of the normals are lost.)"""
+"""Shares of the subject. More than the first, clipped by one lamp, costs accuracy there, and where it leaves fewer
+than three lamps, the normal; a take that loses more than the second so is not usable. (A bust under five lamps that
+clip 6 to 32 % of it each: 5 % are left with fewer than three, and trusted normals are 0.9 degrees off. Under four
+lamps, one of which clips 69 %: 14 % and 0.4 degrees. Under four that clip 30 to 63 % each: 83 %, and 92 % of the
+normals are lost.)"""
 LEAST_SPOILT = 0.005
 """Less is said as hardly anything."""
 MORE_LIGHT = (
